@@ -1,0 +1,10 @@
+// Function attributes shared by host scalars, host SIMD packs and CUDA threads.
+#pragma once
+
+#if defined(__CUDACC__)
+#define BRECCIA_HD __host__ __device__ __forceinline__
+#else
+// always_inline: kernel files are compiled once per instruction set, so no out-of-line copy may exist that the
+// linker could pick for a processor that lacks the instructions.
+#define BRECCIA_HD inline __attribute__((always_inline))
+#endif
