@@ -1,0 +1,33 @@
+// What a scene will do before it runs: effects with reasons, time step and what limits it, memory.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "breccia/scene.hpp"
+
+namespace breccia::sim {
+
+/// One effect as decided, with the reason that `check` prints.
+struct EffectDecision {
+  std::string name;    ///< gravity, shear, strength, damage, viscosity, energy
+  bool on = false;
+  std::string reason;
+};
+
+struct Plan {
+  std::vector<EffectDecision> effects;
+  std::string gravity_method;          ///< "direct", or "off"
+  double time_step = 0.0;              ///< first step [s]
+  std::string time_step_limited_by;    ///< "fixed by the scene", "acoustic with viscosity", "speed"
+  std::uint64_t particles = 0;
+  double bytes_per_particle = 0.0;     ///< particle fields and sort buffer, without the grid
+};
+
+/// Decides the effects and the first time step of a scene.
+Plan make_plan(const Scene& scene);
+
+/// Seconds of wall time per step on this machine for this scene, from a short run of the real engine.
+double calibrate(const Scene& scene);
+
+}  // namespace breccia::sim
