@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 #include <string>
+#include <string_view>
 
 #include "breccia/error.hpp"
 
@@ -36,11 +37,22 @@ bool available(Isa isa) {
   return false;
 }
 
+std::string_view short_name(Isa isa) {
+  switch (isa) {
+    case Isa::kV4:
+      return "v4";
+    case Isa::kV3:
+      return "v3";
+    default:
+      return "v2";
+  }
+}
+
 Isa choose() {
   __builtin_cpu_init();
   if (const char* wish = std::getenv("BRECCIA_ISA"); wish != nullptr && *wish != '\0') {
     for (const Isa isa : {Isa::kV2, Isa::kV3, Isa::kV4}) {
-      if (std::string(wish) != "v" + std::to_string(static_cast<int>(isa))) continue;
+      if (short_name(isa) != wish) continue;
       if (available(isa)) return isa;
       throw UsageError("BRECCIA_ISA=" + std::string(wish) + ": not compiled in, or this processor lacks it");
     }
