@@ -1,5 +1,6 @@
 # Every dependency comes from Debian packages (tools/install-deps).
 find_package(MPI 3.1 REQUIRED COMPONENTS C)
+find_package(Threads REQUIRED)
 find_package(OpenMP REQUIRED COMPONENTS CXX)
 set(HDF5_PREFER_PARALLEL ON)
 find_package(HDF5 REQUIRED COMPONENTS C)

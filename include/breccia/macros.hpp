@@ -8,3 +8,7 @@
 // linker could pick for a processor that lacks the instructions.
 #define BRECCIA_HD inline __attribute__((always_inline))
 #endif
+
+// For lambdas inside inlined kernel code: g++ would otherwise emit them as weak symbols, one of which the linker keeps
+// for every instruction set.
+#define BRECCIA_INLINE_LAMBDA __attribute__((always_inline))

@@ -48,9 +48,10 @@ struct PackMask {
   Vector v;
 };
 
-/// W lanes of S. Arithmetic is lane-wise; a scalar operand is broadcast.
+/// W lanes of S. Arithmetic is lane-wise; a scalar operand is broadcast. The alignment is stated because that of a wide
+/// vector depends on the instruction set, and packs in memory are shared by all copies of the kernels.
 template <class S, int W>
-struct Pack {
+struct alignas(sizeof(S) * W) Pack {
   using Scalar = S;
   using Vector = typename detail::VectorOf<S, W>::type;
   using MaskInt = typename detail::IntOfSize<S>::type;

@@ -15,7 +15,7 @@ struct State {
   Accumulator<T> energy;  ///< specific internal energy [J/kg] (energy)
   T kirchhoff_pressure;   ///< J P after damage and apex [Pa]: rebuilds tau of the last stress call
   T damage_root;          ///< D^(1/3) (damage or strength)
-  Sym3<T> total;          ///< T = F F^T - I of the total deformation (damage, while D < 1)
+  Sym3<T> total;          ///< T = F F^T - I of the total deformation (damage; 0 once D = 1)
 };
 
 /// What one stress call adds to the energy budget, per unit reference volume [J/m3].

@@ -5,23 +5,17 @@
 #include <vector>
 
 #include "breccia/scene.hpp"
+#include "sim/effects.hpp"
 
 namespace breccia::sim {
 
-/// One effect as decided, with the reason that `check` prints.
-struct EffectDecision {
-  std::string name;    ///< gravity, shear, strength, damage, viscosity, energy
-  bool on = false;
-  std::string reason;
-};
-
 struct Plan {
   std::vector<EffectDecision> effects;
-  std::string gravity_method;          ///< "direct", or "off"
-  double time_step = 0.0;              ///< first step [s]
-  std::string time_step_limited_by;    ///< "fixed by the scene", "acoustic with viscosity", "speed"
+  std::string gravity_method;        ///< "direct", or "off"
+  double time_step = 0.0;            ///< first step [s]
+  std::string time_step_limited_by;  ///< "fixed by the scene", "acoustic with viscosity", "speed"
   std::uint64_t particles = 0;
-  double bytes_per_particle = 0.0;     ///< particle fields and sort buffer, without the grid
+  double bytes_per_particle = 0.0;  ///< particle fields and sort buffer, without the grid
 };
 
 /// Decides the effects and the first time step of a scene.

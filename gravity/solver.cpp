@@ -1,0 +1,31 @@
+#include "gravity/solver.hpp"
+
+#include <cmath>
+#include <string>
+
+#include "breccia/error.hpp"
+#include "gravity/direct_sum.hpp"
+
+namespace breccia::gravity {
+
+std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& parameters, const mpi::Comm& comm,
+                                    int threads) {
+  if (!(parameters.softening >= 0.0) || !std::isfinite(parameters.softening)) {
+    throw UsageError("gravity.softening = " + std::to_string(parameters.softening) +
+                     " m: must be zero or a positive finite length");
+  }
+  switch (method) {
+    case GravityMethod::kDirect:
+    case GravityMethod::kAuto:
+      return std::make_unique<DirectSum>(parameters, comm, threads);
+    case GravityMethod::kOff:
+      throw UsageError("effects.gravity = off: there is nothing to evaluate; use direct");
+    case GravityMethod::kTree:
+      throw UsageError("effects.gravity = tree: this version has no tree; use direct");
+    case GravityMethod::kTreePm:
+      throw UsageError("effects.gravity = treepm: this version has no particle mesh; use direct");
+  }
+  throw UsageError("effects.gravity: unknown method; use direct");
+}
+
+}  // namespace breccia::gravity

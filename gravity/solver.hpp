@@ -1,0 +1,53 @@
+// What every gravity solver offers: accelerations and potentials of point masses spread over the ranks.
+#pragma once
+
+#include <memory>
+#include <span>
+
+#include "breccia/linalg.hpp"
+#include "breccia/scene.hpp"
+#include "mpi/comm.hpp"
+
+namespace breccia::gravity {
+
+/// The particles of this rank at the time the field is wanted for (Window::prediction_time).
+struct ParticlesView {
+  std::span<const Vec3d> position;  ///< [m]
+  std::span<const double> mass;     ///< [kg]
+};
+
+struct Parameters {
+  double softening = 0.0;  ///< Plummer length: a pair at distance r counts with 1/sqrt(r^2 + softening^2) [m]
+  Precision precision = Precision::kMixed;
+};
+
+/// What one evaluation cost and how well it conserved momentum. Seconds, pairs and bytes are this rank's.
+struct Stats {
+  double seconds = 0.0;
+  double pairs = 0.0;
+  double bytes_sent = 0.0;
+  Vec3d net_force_removed{};    ///< sum(m a) that was subtracted from all accelerations [N]; zero for a pairwise sum
+  double momentum_error = 0.0;  ///< |sum(m a)| / sum(m |a|) over all ranks
+};
+
+class Solver {
+ public:
+  Solver() = default;
+  Solver(const Solver&) = delete;
+  Solver& operator=(const Solver&) = delete;
+  virtual ~Solver() = default;
+
+  /// Acceleration [m/s2] and, unless its span is empty, potential without the self term [J/kg] of this rank's
+  /// particles, in their order. Collective: the ranks agree on whether the potential is wanted; a rank may be empty.
+  virtual void evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) = 0;
+
+  /// Of the last evaluation.
+  [[nodiscard]] virtual const Stats& last() const = 0;
+};
+
+/// The solver for `method`; kAuto takes the only one there is, the direct sum. Throws UsageError for kOff, for methods
+/// this program lacks and for a softening that is negative or not finite.
+std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& parameters, const mpi::Comm& comm,
+                                    int threads);
+
+}  // namespace breccia::gravity

@@ -1,0 +1,74 @@
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "breccia/error.hpp"
+#include "cli/command.hpp"
+#include "cli/scene_options.hpp"
+#include "scene/units.hpp"
+#include "sim/run.hpp"
+
+namespace breccia::cli {
+namespace {
+
+struct Options {
+  SceneOptions scene;
+  std::string out;
+  std::string until;
+  std::optional<std::uint64_t> steps;
+  std::string device = "auto";
+  int threads = 1;
+  bool profile = false;
+};
+
+double parse_until(const std::string& text) {
+  try {
+    return scene::parse_quantity(text, scene::kTime);
+  } catch (const UsageError& error) {
+    throw UsageError("--until: " + std::string(error.what()));
+  }
+}
+
+void check_device(const std::string& device) {
+  if (device == "cuda") {
+    throw UsageError("--device cuda: this build has only the host engine; use --device host or auto");
+  }
+}
+
+void run(const Options& options, const mpi::Comm& comm) {
+  check_device(options.device);
+  sim::RunOptions run_options;
+  run_options.out = options.out;
+  if (!options.until.empty()) run_options.until = parse_until(options.until);
+  run_options.steps = options.steps;
+  run_options.threads = options.threads;
+  run_options.profile = options.profile;
+  scene::LoadedScene loaded = load(options.scene, comm);
+  run_options.resolved = std::move(loaded.keys);
+  sim::run(loaded.scene, run_options, comm);
+}
+
+}  // namespace
+
+void add_run(CLI::App& app, Action& action) {
+  CLI::App& command = *app.add_subcommand("run", "Run a scene, alone or under mpirun");
+  const auto options = std::make_shared<Options>();
+  add_scene_options(command, options->scene);
+  command.add_option("--out", options->out, "Output folder, new or empty [out/<scene name>]")->type_name("DIR");
+  command.add_option("--until", options->until, "End at this simulated time instead, e.g. \"2000 s\"")
+      ->type_name("TIME");
+  command.add_option("--steps", options->steps, "End after this many steps")
+      ->check(CLI::NonNegativeNumber)
+      ->option_text("N");
+  command.add_option("--device", options->device, "Where to compute")
+      ->check(CLI::IsMember({"auto", "host", "cuda"}))
+      ->option_text("auto|host|cuda");
+  command.add_option("--threads", options->threads, "Threads of each rank [1]")
+      ->check(CLI::PositiveNumber)
+      ->option_text("N");
+  command.add_flag("--profile", options->profile, "Print the time of each stage at the end");
+  command.callback([options, &action] { action = [options](const mpi::Comm& comm) { run(*options, comm); }; });
+}
+
+}  // namespace breccia::cli

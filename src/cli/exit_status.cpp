@@ -1,0 +1,86 @@
+#include "cli/exit_status.hpp"
+
+#include <fmt/core.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cstdio>
+#include <exception>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "breccia/error.hpp"
+
+namespace breccia::cli {
+namespace {
+
+/// How long a failed rank waits for the others to end: an error that all ranks share reaches them at about the same
+/// time, ranks that wait for this one in a collective call never end by themselves.
+constexpr std::chrono::seconds kPatience{10};
+constexpr int kDefect = 1;
+
+struct Outcome {
+  int code = static_cast<int>(ExitCode::kDone);
+  std::string message;
+};
+
+Outcome outcome_of(const std::function<void()>& command) {
+  try {
+    command();
+    return {};
+  } catch (const Error& error) {
+    return {static_cast<int>(error.code()), error.what()};
+  } catch (const std::bad_alloc&) {
+    return {kDefect, "out of memory"};
+  } catch (const std::exception& error) {
+    return {kDefect, std::string("internal error: ") + error.what()};
+  }
+}
+
+void print_error(const Outcome& outcome, int rank) {
+  std::string line = outcome.message;
+  std::replace(line.begin(), line.end(), '\n', ' ');
+  const std::string where = rank == 0 ? "" : fmt::format("rank {}: ", rank);
+  std::fflush(stdout);
+  fmt::print(stderr, "breccia: error: {}{}\n", where, line);
+}
+
+/// True once `request` is complete; false if that takes longer than kPatience.
+bool completes_in_time(MPI_Request& request) {
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  int done = 0;
+  MPI_Test(&request, &done, MPI_STATUS_IGNORE);
+  while (done == 0 && std::chrono::steady_clock::now() < deadline) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    MPI_Test(&request, &done, MPI_STATUS_IGNORE);
+  }
+  return done != 0;
+}
+
+}  // namespace
+
+int exit_status(const std::function<void()>& command, const mpi::Comm& comm) {
+  // An own communicator: the ranks may have left `comm` in the middle of different collective calls.
+  MPI_Comm ending = MPI_COMM_NULL;
+  MPI_Comm_dup(comm.handle(), &ending);
+  const Outcome mine = outcome_of(command);
+
+  std::vector<int> codes(static_cast<std::size_t>(comm.size()));
+  MPI_Request request = MPI_REQUEST_NULL;
+  MPI_Iallgather(&mine.code, 1, MPI_INT, codes.data(), 1, MPI_INT, ending, &request);
+  if (mine.code == 0) {
+    MPI_Wait(&request, MPI_STATUS_IGNORE);
+  } else if (!completes_in_time(request)) {
+    print_error(mine, comm.rank());
+    MPI_Abort(comm.handle(), mine.code);
+  }
+  MPI_Comm_free(&ending);
+
+  const auto failed = std::find_if(codes.begin(), codes.end(), [](int code) { return code != 0; });
+  if (failed == codes.end()) return 0;
+  if (failed - codes.begin() == comm.rank()) print_error(mine, comm.rank());
+  return *failed;
+}
+
+}  // namespace breccia::cli

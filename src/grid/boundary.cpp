@@ -1,0 +1,106 @@
+#include "grid/boundary.hpp"
+
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "breccia/error.hpp"
+#include "grid/tile.hpp"
+
+namespace breccia::grid {
+namespace {
+
+double& component(Vec3d& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+double component(const Vec3d& v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; }
+
+int axis_of(const Vec3d& normal) {
+  for (int axis = 0; axis < 3; ++axis) {
+    if (std::abs(component(normal, axis)) > 1.0 - 1e-9) return axis;
+  }
+  return -1;
+}
+
+// The velocity a wall allows at a node inside it.
+Vec3d constrained(const BoundaryPlane& wall, Vec3d v) {
+  if (wall.kind == BoundaryKind::kStick) return {};
+  const double along_normal = dot(v, wall.normal);
+  const Vec3d tangential = v - along_normal * wall.normal;
+  if (wall.kind == BoundaryKind::kSlip) return tangential;
+  if (along_normal >= 0.0) return v;
+  const double speed = std::sqrt(dot(tangential, tangential));
+  const double lost = -wall.friction * along_normal;
+  return speed > lost ? (1.0 - lost / speed) * tangential : Vec3d{};
+}
+
+}  // namespace
+
+BoundarySet::BoundarySet(std::span<const BoundaryPlane> planes, double cell) : cell_(cell) {
+  std::vector<BoundaryPlane> periodic;
+  for (const BoundaryPlane& plane : planes)
+    (plane.kind == BoundaryKind::kPeriodic ? periodic : walls_).push_back(plane);
+  for (const BoundaryPlane& low : periodic) {
+    const int axis = axis_of(low.normal);
+    if (axis < 0) throw UsageError("boundary: a periodic plane must be normal to a coordinate axis");
+    if (component(low.normal, axis) < 0) continue;
+    for (const BoundaryPlane& high : periodic) {
+      if (axis_of(high.normal) != axis || component(high.normal, axis) > 0) continue;
+      const double start = component(low.point, axis);
+      const double cells = (component(high.point, axis) - start) / cell;
+      const double blocks = std::round(cells / kBlockWidth);
+      if (blocks < 1 || std::abs(cells - blocks * kBlockWidth) > 1e-6 * cells) {
+        throw UsageError("boundary: periodic planes must be a multiple of 4 cells apart (" +
+                         std::to_string(kBlockWidth * cell) + " m); here they are " + std::to_string(cells) +
+                         " cells apart");
+      }
+      periodicity_.blocks[static_cast<std::size_t>(axis)] = static_cast<std::int32_t>(blocks);
+      component(period_start_, axis) = start;
+    }
+  }
+}
+
+void BoundarySet::find_nodes(std::span<const BlockKey> blocks) {
+  nodes_.clear();
+  if (walls_.empty()) return;
+  for (std::size_t b = 0; b < blocks.size(); ++b) {
+    const BlockCoord block = block_coord(blocks[b]);
+    for (int n = 0; n < kBlockNodes; ++n) {
+      const Vec3d x = cell_ * Vec3d{static_cast<double>(kBlockWidth * block.x + n / 16),
+                                    static_cast<double>(kBlockWidth * block.y + n / 4 % 4),
+                                    static_cast<double>(kBlockWidth * block.z + n % 4)};
+      for (std::size_t w = 0; w < walls_.size(); ++w) {
+        // A node on the plane belongs to the wall; rounding of x must not decide.
+        if (dot(x - walls_[w].point, walls_[w].normal) > 1e-6 * cell_) continue;
+        nodes_.push_back(
+            {static_cast<std::uint32_t>(b * kBlockNodes + static_cast<std::size_t>(n)), static_cast<std::uint32_t>(w)});
+      }
+    }
+  }
+}
+
+template <class Real>
+void BoundarySet::apply(Real* velocities) const {
+  for (const WallNode& at : nodes_) {
+    Real* v = velocities + std::size_t{at.node} * kChannels + kNewVelocity;
+    const Vec3d allowed = constrained(walls_[at.wall], {v[0], v[1], v[2]});
+    v[0] = static_cast<Real>(allowed.x);
+    v[1] = static_cast<Real>(allowed.y);
+    v[2] = static_cast<Real>(allowed.z);
+  }
+}
+
+template void BoundarySet::apply<float>(float*) const;
+template void BoundarySet::apply<double>(double*) const;
+
+Vec3d BoundarySet::into_period(Vec3d x) const {
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t blocks = periodicity_.blocks[static_cast<std::size_t>(axis)];
+    if (blocks == 0) continue;
+    const double length = blocks * kBlockWidth * cell_;
+    const double start = component(std::as_const(period_start_), axis);
+    double& value = component(x, axis);
+    value -= length * std::floor((value - start) / length);
+  }
+  return x;
+}
+
+}  // namespace breccia::grid

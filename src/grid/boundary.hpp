@@ -1,0 +1,40 @@
+// Walls: planes that act on grid velocities, and periodic pairs of planes.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "breccia/scene.hpp"
+#include "grid/blocks.hpp"
+
+namespace breccia::grid {
+
+class BoundarySet {
+ public:
+  BoundarySet(std::span<const BoundaryPlane> planes, double cell);
+
+  /// Axes that repeat. Throws UsageError if a periodic pair is not a multiple of 4 cells apart.
+  [[nodiscard]] const Periodicity& periodicity() const { return periodicity_; }
+  /// Finds the nodes of these blocks that lie in or behind a wall.
+  void find_nodes(std::span<const BlockKey> blocks);
+  /// Applies the walls to v^{n+1/2} of the found nodes. `velocities` as in tile.hpp.
+  template <class Real>
+  void apply(Real* velocities) const;
+  /// The position moved into the period of the periodic axes.
+  [[nodiscard]] Vec3d into_period(Vec3d x) const;
+
+ private:
+  struct WallNode {
+    std::uint32_t node;
+    std::uint32_t wall;
+  };
+
+  double cell_;
+  std::vector<BoundaryPlane> walls_;
+  std::vector<WallNode> nodes_;
+  Periodicity periodicity_;
+  Vec3d period_start_{};
+};
+
+}  // namespace breccia::grid

@@ -1,0 +1,101 @@
+// The MPM engine: particles, sparse grid, slabs and halo behind the operations the time step calls (sim/time_step.cpp).
+// Knows nothing of gravity solvers, output or time control.
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <vector>
+
+#include "breccia/particle_arrays.hpp"
+#include "breccia/scene.hpp"
+#include "material/effects_policy.hpp"
+#include "material/flaws.hpp"
+#include "mpi/comm.hpp"
+
+namespace breccia::grid {
+
+/// What an engine is made for.
+struct EngineSetup {
+  double cell = 0.0;  ///< dx [m]
+  std::vector<MaterialParameters> materials;
+  std::vector<BoundaryPlane> boundaries;
+  material::RuntimeEffects effects;
+  bool self_gravity = false;  ///< particles hold an acceleration over a window
+  Vec3d uniform_gravity{};    ///< [m/s2]
+  NumericsParameters numerics;
+  int threads = 1;
+};
+
+/// Sums of a pass over this rank's particles.
+struct PassReport {
+  double plastic_work = 0.0;  ///< [J]
+  double viscous_work = 0.0;  ///< [J]
+  double largest_move = 0.0;  ///< [cells]
+};
+
+/// Fastest signals over all ranks, for the time step.
+struct SignalSpeeds {
+  double sound = 0.0;             ///< longitudinal [m/s]
+  double particle = 0.0;          ///< largest |v| along an axis [m/s]
+  double compression_rate = 0.0;  ///< largest -tr C [1/s]
+};
+
+/// Numbers of this rank, for diagnostics and the profile.
+struct EngineStats {
+  std::uint64_t particles = 0;
+  std::uint64_t tiles = 0;
+  std::uint64_t blocks = 0;
+  std::uint64_t halo_bytes_per_step = 0;
+  std::uint64_t particle_bytes = 0;
+  std::uint64_t grid_bytes = 0;
+};
+
+class Engine {
+ public:
+  virtual ~Engine() = default;
+
+  /// Takes the particles of this rank, with the flaws of each (empty lists if damage is off), and sorts them.
+  /// `spin` gives the initial velocity gradient of each body. Collective.
+  virtual void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
+                      std::span<const Vec3d> spin_of_body) = 0;
+
+  /// Sorts particles into tiles, sends those that left the slab to their owner, rebuilds blocks and halo. Only between
+  /// gather() and scatter(). Collective.
+  virtual void sort() = 0;
+
+  /// Stress and P2G: particles at t_n give the sums of the grid. `half_step`: half the dt of the velocity gradient.
+  virtual void scatter(double half_step) = 0;
+  /// Halo sums to owners, v_i^{n+1/2} = v_i^{n-1/2} + kick f_i/m_i, boundaries, velocities back. Collective.
+  virtual void update_grid(double kick) = 0;
+  /// G2P and particle update over `step`.
+  virtual void gather(double step) = 0;
+  /// gather(step) and the next scatter(step / 2) in one sweep.
+  virtual void gather_scatter(double step) = 0;
+
+  /// Positions x + time * v [m] and masses [kg] of this rank's particles, in the order held_gravity expects.
+  virtual void predict(double time, std::vector<Vec3d>& position, std::vector<double>& mass) const = 0;
+  /// Sets the acceleration held until the next call [m/s2].
+  virtual void hold_gravity(std::span<const Vec3d> acceleration) = 0;
+  /// v -= time * g with the held and the uniform gravity: makes v^{-1/2} from v(0).
+  virtual void kick_velocities(double time) = 0;
+
+  /// Everything at t_n, after update_grid(): velocities are the mean of v^{n-1/2} and v^{n+1/2}.
+  [[nodiscard]] virtual ParticleOutput observe() const = 0;
+  /// J of each particle in the order of observe(), and the elastic shear energy of this rank [J].
+  [[nodiscard]] virtual std::vector<double> volume_ratios() const = 0;
+  [[nodiscard]] virtual double elastic_energy() const = 0;
+
+  /// Collective.
+  [[nodiscard]] virtual SignalSpeeds signal_speeds() const = 0;
+  /// True on all ranks once every particle has D = 1; then damage is switched off and its fields are freed. Collective,
+  /// only between gather() and scatter().
+  virtual bool finish_damage() = 0;
+
+  [[nodiscard]] virtual const PassReport& last_pass() const = 0;
+  [[nodiscard]] virtual EngineStats stats() const = 0;
+};
+
+std::unique_ptr<Engine> make_engine(const EngineSetup& setup, const mpi::Comm& comm);
+
+}  // namespace breccia::grid

@@ -1,0 +1,191 @@
+#include "grid/host_engine.hpp"
+
+#include <pmmintrin.h>
+#include <xmmintrin.h>
+
+#include <algorithm>
+#include <string>
+
+#include "breccia/error.hpp"
+
+namespace breccia::grid {
+namespace {
+
+// Denormals cost hundreds of cycles and mean nothing here (cpu_limit.md 8).
+void flush_denormals() {
+  _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
+  _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
+}
+
+GroupSet groups_for(const EngineSetup& setup) {
+  const material::RuntimeEffects& fx = setup.effects;
+  return {.elastic = fx.shear,
+          .energy = fx.energy,
+          .damage_level = (fx.strength || fx.damage) && !fx.fully_damaged,
+          .flaws = fx.damage,
+          .gravity = setup.self_gravity};
+}
+
+TransferParameters transfer_for(const NumericsParameters& numerics) {
+  switch (numerics.transfer) {
+    case Transfer::kApic:
+      return {.alpha = 0.0, .beta = 0.0, .affine = true};
+    case Transfer::kFlip:
+      return {.alpha = numerics.asflip_alpha, .beta = 0.0, .affine = false};
+    case Transfer::kAsflip:
+      break;
+  }
+  return {.alpha = numerics.asflip_alpha, .beta = numerics.asflip_beta, .affine = true};
+}
+
+}  // namespace
+
+template <class P>
+HostEngine<P>::HostEngine(const EngineSetup& setup, const mpi::Comm& comm)
+    : setup_(setup),
+      comm_(comm),
+      kernels_(active_kernels<P>()),
+      boundaries_(setup.boundaries, setup.cell),
+      transfer_(transfer_for(setup.numerics)),
+      store_(groups_for(setup)) {
+  periodicity_ = boundaries_.periodicity();
+  for (const MaterialParameters& material : setup.materials) {
+    constants_.push_back(material::make_constants<Real>(material, setup.numerics.literal, setup.cell));
+    double_constants_.push_back(material::make_constants<double>(material, setup.numerics.literal, setup.cell));
+  }
+#pragma omp parallel num_threads(setup_.threads)
+  flush_denormals();
+}
+
+template <class P>
+PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
+  PassArguments<P> a;
+  a.tiles = tiles_.data();
+  a.kinematics = store_.kinematics.data();
+  a.volume = store_.volume.data();
+  a.elastic = store_.elastic.data();
+  a.energy = store_.energy.data();
+  a.damage_level = store_.damage_level.data();
+  a.flaws = store_.flaws.data();
+  a.gravity = setup_.self_gravity ? store_.gravity.data() : nullptr;
+  a.identity = store_.identity.data();
+  a.affine = store_.affine.data();
+  a.velocities = velocities_.data();
+  a.sums = sums_.data();
+  a.flaw_thresholds = flaw_thresholds_.data();
+  a.materials = constants_.data();
+  a.material_count = static_cast<int>(constants_.size());
+  a.effects = setup_.effects;
+  a.cell = static_cast<Real>(setup_.cell);
+  a.step = static_cast<Real>(step);
+  a.stress_half_step = static_cast<Real>(half_step);
+  a.uniform_gravity = {static_cast<Real>(setup_.uniform_gravity.x), static_cast<Real>(setup_.uniform_gravity.y),
+                       static_cast<Real>(setup_.uniform_gravity.z)};
+  a.transfer = transfer_;
+  return a;
+}
+
+template <class P>
+void HostEngine<P>::run_pass(const PassArguments<P>& arguments) {
+  std::vector<TileReport> reports(tiles_.size());
+#pragma omp parallel num_threads(setup_.threads)
+  for (const std::vector<std::uint32_t>& colour : tiles_of_colour_) {
+#pragma omp for schedule(static)
+    for (std::size_t n = 0; n < colour.size(); ++n) kernels_.pass(arguments, colour[n], reports[colour[n]]);
+  }
+  report_ = {};
+  for (const TileReport& r : reports) {
+    report_.plastic_work += r.plastic_work;
+    report_.viscous_work += r.viscous_work;
+    report_.largest_move = std::max(report_.largest_move, r.largest_move);
+    strayed_packs_ += r.strayed;
+  }
+}
+
+template <class P>
+void HostEngine<P>::scatter(double half_step) {
+  PassArguments<P> a = pass_arguments(0.0, half_step);
+  a.gather = false;
+  run_pass(a);
+}
+
+template <class P>
+void HostEngine<P>::gather(double step) {
+  PassArguments<P> a = pass_arguments(step, 0.0);
+  a.scatter = false;
+  run_pass(a);
+}
+
+template <class P>
+void HostEngine<P>::gather_scatter(double step) {
+  run_pass(pass_arguments(step, 0.5 * step));
+}
+
+template <class P>
+void HostEngine<P>::update_grid(double kick) {
+  halo_.add_to_owners(sums_.data(), comm_);
+  NodeArguments<P> a;
+  a.sums = sums_.data();
+  a.velocities = velocities_.data();
+  a.kick = static_cast<Real>(kick);
+  a.smallest_mass = static_cast<Real>(1e-30 * smallest_mass_);
+  const auto blocks = static_cast<std::uint32_t>(owned_blocks_);
+  constexpr std::uint32_t chunk = 16;
+#pragma omp parallel for schedule(static) num_threads(setup_.threads)
+  for (std::uint32_t b = 0; b < blocks; b += chunk) kernels_.update_blocks(a, b, std::min(b + chunk, blocks));
+  boundaries_.apply(velocities_.data());
+  halo_.share_from_owners(velocities_.data(), comm_);
+}
+
+template <class P>
+void HostEngine<P>::predict(double time, std::vector<Vec3d>& position_out, std::vector<double>& mass) const {
+  position_out.clear();
+  mass.clear();
+  for_each_particle([&](std::size_t slot, const Tile& tile) {
+    const auto& k = store_.kinematics[slot / kLanes];
+    const int lane = static_cast<int>(slot % kLanes);
+    const Vec3d v{k.velocity[0][lane], k.velocity[1][lane], k.velocity[2][lane]};
+    position_out.push_back(position(slot, tile) + time * v);
+    mass.push_back(k.mass[lane]);
+  });
+}
+
+template <class P>
+void HostEngine<P>::hold_gravity(std::span<const Vec3d> acceleration) {
+  std::size_t n = 0;
+  for_each_particle([&](std::size_t slot, const Tile&) {
+    auto& held = store_.gravity[slot / kLanes].acceleration;
+    const int lane = static_cast<int>(slot % kLanes);
+    held[0].set(lane, static_cast<Real>(acceleration[n].x));
+    held[1].set(lane, static_cast<Real>(acceleration[n].y));
+    held[2].set(lane, static_cast<Real>(acceleration[n].z));
+    ++n;
+  });
+}
+
+template <class P>
+void HostEngine<P>::kick_velocities(double time) {
+  const double uniform[3] = {setup_.uniform_gravity.x, setup_.uniform_gravity.y, setup_.uniform_gravity.z};
+  for_each_particle([&](std::size_t slot, const Tile&) {
+    const std::size_t pack = slot / kLanes;
+    const int lane = static_cast<int>(slot % kLanes);
+    for (int axis = 0; axis < 3; ++axis) {
+      double g = uniform[axis];
+      if (setup_.self_gravity) g += static_cast<double>(store_.gravity[pack].acceleration[axis][lane]);
+      auto& v = store_.kinematics[pack].velocity[axis];
+      v.set(lane, static_cast<Real>(static_cast<double>(v[lane]) - time * g));
+    }
+  });
+}
+
+std::unique_ptr<Engine> make_engine(const EngineSetup& setup, const mpi::Comm& comm) {
+  if (setup.numerics.precision == Precision::kDouble) {
+    return std::make_unique<HostEngine<DoublePrecision>>(setup, comm);
+  }
+  return std::make_unique<HostEngine<MixedPrecision>>(setup, comm);
+}
+
+template class HostEngine<MixedPrecision>;
+template class HostEngine<DoublePrecision>;
+
+}  // namespace breccia::grid

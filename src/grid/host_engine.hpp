@@ -1,0 +1,105 @@
+// The engine on host cores: threads over tiles, one colour of tiles after the other so that no node is written twice at
+// once and sums are repeatable for any number of threads.
+#pragma once
+
+#include "grid/blocks.hpp"
+#include "grid/boundary.hpp"
+#include "grid/engine.hpp"
+#include "grid/tile.hpp"
+#include "mpi/halo.hpp"
+#include "mpi/slabs.hpp"
+
+namespace breccia::grid {
+
+/// A particle on the way to its tile: where it is now and its nearest node in global coordinates.
+struct Placement {
+  std::uint32_t slot;
+  std::int32_t node[3];
+};
+
+template <class P>
+class HostEngine final : public Engine {
+ public:
+  using Real = typename P::Real;
+
+  HostEngine(const EngineSetup& setup, const mpi::Comm& comm);
+
+  void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
+              std::span<const Vec3d> spin_of_body) override;
+  void sort() override;
+  void scatter(double half_step) override;
+  void update_grid(double kick) override;
+  void gather(double step) override;
+  void gather_scatter(double step) override;
+  void predict(double time, std::vector<Vec3d>& position, std::vector<double>& mass) const override;
+  void hold_gravity(std::span<const Vec3d> acceleration) override;
+  void kick_velocities(double time) override;
+  [[nodiscard]] ParticleOutput observe() const override;
+  [[nodiscard]] std::vector<double> volume_ratios() const override;
+  [[nodiscard]] double elastic_energy() const override;
+  [[nodiscard]] SignalSpeeds signal_speeds() const override;
+  bool finish_damage() override;
+  [[nodiscard]] const PassReport& last_pass() const override { return report_; }
+  [[nodiscard]] EngineStats stats() const override;
+
+ private:
+  static constexpr std::size_t kLanes = P::kLanes;
+
+  // Passes (host_engine.cpp).
+  PassArguments<P> pass_arguments(double step, double half_step);
+  void run_pass(const PassArguments<P>& arguments);
+
+  // Sorting and migration (host_engine_sort.cpp, host_engine_connect.cpp, host_engine_insert.cpp).
+  void settle(std::vector<Placement> placements);
+  void choose_slabs(std::span<const Placement> placements);
+  [[nodiscard]] std::vector<Placement> place_all() const;
+  void migrate(std::vector<Placement>& placements);
+  void arrange(std::span<const Placement> placements);
+  void connect_tiles();
+  void connect_halo();
+  void colour_tiles();
+  void compact_flaws();
+  [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
+
+  // Calls visit(slot, tile) for every particle, in storage order.
+  template <class F>
+  void for_each_particle(F&& visit) const {
+    for (const Tile& tile : tiles_) {
+      for (std::uint32_t n = 0; n < tile.particles; ++n) visit(tile.first_pack * kLanes + n, tile);
+    }
+  }
+  [[nodiscard]] Vec3d position(std::size_t slot, const Tile& tile) const;
+  [[nodiscard]] std::uint64_t id(std::size_t slot) const;
+  [[nodiscard]] std::uint32_t material(std::size_t slot) const;
+  [[nodiscard]] double hencky_norm(std::size_t slot) const;  // |dev h| of the elastic strain
+
+  EngineSetup setup_;
+  mpi::Comm comm_;
+  const Kernels<P>& kernels_;
+  std::vector<material::Constants<Real>> constants_;
+  std::vector<material::Constants<double>> double_constants_;
+  Periodicity periodicity_;
+  BoundarySet boundaries_;
+  TransferParameters transfer_;
+
+  ParticleStore<P> store_;
+  std::vector<float> flaw_thresholds_;
+  std::vector<Tile> tiles_;
+  std::vector<std::vector<std::uint32_t>> tiles_of_colour_;
+  BlockTable blocks_;
+  std::vector<Real> sums_;
+  std::vector<Real> velocities_;
+  std::size_t owned_blocks_ = 0;
+  double smallest_mass_ = 0.0;
+  std::uint64_t strayed_packs_ = 0;  // seen since the last sorting; reported there, on all ranks at once
+
+  bool slabs_chosen_ = false;
+  mpi::Slabs slabs_;
+  mpi::Halo<Real, kChannels> halo_;
+  PassReport report_;
+};
+
+extern template class HostEngine<MixedPrecision>;
+extern template class HostEngine<DoublePrecision>;
+
+}  // namespace breccia::grid

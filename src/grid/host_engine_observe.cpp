@@ -1,0 +1,165 @@
+// What output, diagnostics and time control read from the engine. Nothing here changes its state.
+#include <algorithm>
+#include <cmath>
+
+#include "grid/host_engine.hpp"
+
+namespace breccia::grid {
+
+template <class P>
+Vec3d HostEngine<P>::position(std::size_t slot, const Tile& tile) const {
+  const Kinematics<P>& k = store_.kinematics[slot / kLanes];
+  const int lane = static_cast<int>(slot % kLanes);
+  const BlockCoord block = block_coord(blocks_.keys()[tile.block]);
+  double x[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    const int node = kBlockWidth * component(block, axis) + ((k.node[lane] >> (8 * axis)) & 255) - kNodeBias;
+    const double scale = sizeof(typename P::Offset) == 4 ? 0x1p-32 : 1.0;
+    x[axis] = setup_.cell * (node + scale * static_cast<double>(k.offset[axis][lane]));
+  }
+  return boundaries_.into_period({x[0], x[1], x[2]});
+}
+
+template <class P>
+std::uint64_t HostEngine<P>::id(std::size_t slot) const {
+  const Identity<P>& identity = store_.identity[slot / kLanes];
+  const int lane = static_cast<int>(slot % kLanes);
+  return static_cast<std::uint32_t>(identity.id_low[lane]) |
+         std::uint64_t{static_cast<std::uint32_t>(identity.id_high[lane])} << 32;
+}
+
+template <class P>
+std::uint32_t HostEngine<P>::material(std::size_t slot) const {
+  return static_cast<std::uint32_t>(store_.identity[slot / kLanes].body_material[static_cast<int>(slot % kLanes)]) >>
+         16;
+}
+
+template <class P>
+ParticleOutput HostEngine<P>::observe() const {
+  std::vector<Real> new_velocity(store_.packs() * kLanes * 3);
+  std::vector<Real> node_mass(store_.packs() * kLanes);
+  ProbeArguments<P> probe;
+  probe.tiles = tiles_.data();
+  probe.kinematics = store_.kinematics.data();
+  probe.velocities = velocities_.data();
+  probe.transfer = transfer_;
+  probe.new_velocity = new_velocity.data();
+  probe.node_mass = node_mass.data();
+  for (std::uint32_t t = 0; t < tiles_.size(); ++t) kernels_.probe(probe, t);
+
+  const material::RuntimeEffects& fx = setup_.effects;
+  const double cell_volume = setup_.cell * setup_.cell * setup_.cell;
+  ParticleOutput out;
+  for_each_particle([&](std::size_t slot, const Tile& tile) {
+    const std::size_t pack = slot / kLanes;
+    const int lane = static_cast<int>(slot % kLanes);
+    const Kinematics<P>& k = store_.kinematics[pack];
+    const MaterialParameters& parameters = setup_.materials[material(slot)];
+    const double ratio = 1.0 + static_cast<double>(store_.volume[pack].change.value()[lane]);
+    const auto mean = [&](int axis) {
+      return 0.5 * (static_cast<double>(k.velocity[axis][lane]) +
+                    static_cast<double>(new_velocity[3 * slot + static_cast<std::size_t>(axis)]));
+    };
+    out.id.push_back(id(slot));
+    out.position.push_back(position(slot, tile));
+    out.velocity.push_back({mean(0), mean(1), mean(2)});
+    out.mass.push_back(static_cast<double>(k.mass[lane]));
+    out.body.push_back(static_cast<std::uint32_t>(store_.identity[pack].body_material[lane]) & 0xffffU);
+    out.material.push_back(material(slot));
+    out.density.push_back(parameters.eos.rho0 / ratio);
+    out.grid_density.push_back(static_cast<double>(node_mass[slot]) / cell_volume);
+    out.pressure.push_back(static_cast<double>(store_.volume[pack].kirchhoff_pressure[lane]) / ratio);
+    double damage = fx.fully_damaged ? 1.0 : 0.0;
+    if (store_.has(Group::kDamageLevel)) {
+      const auto root = static_cast<double>(store_.damage_level[pack].root[lane]);
+      damage = root * root * root;
+    }
+    out.damage.push_back(damage);
+    if (fx.energy) out.internal_energy.push_back(static_cast<double>(store_.energy[pack].specific.value()[lane]));
+    if (fx.shear) {
+      out.shear_stress.push_back(2.0 * parameters.shear_modulus * hencky_norm(slot) / (std::sqrt(2.0) * ratio));
+    }
+  });
+  return out;
+}
+
+template <class P>
+double HostEngine<P>::hencky_norm(std::size_t slot) const {
+  const int lane = static_cast<int>(slot % kLanes);
+  const auto& e = store_.elastic[slot / kLanes].strain;
+  const Dev3<double> strain{static_cast<double>(e[0][lane]), static_cast<double>(e[1][lane]),
+                            static_cast<double>(e[2][lane]), static_cast<double>(e[3][lane]),
+                            static_cast<double>(e[4][lane])};
+  const auto powers = material::traceless_powers(strain);
+  return 0.5 * std::sqrt(material::squared_norm(material::deviatoric_log(strain, powers)));
+}
+
+template <class P>
+std::vector<double> HostEngine<P>::volume_ratios() const {
+  std::vector<double> ratios;
+  for_each_particle([&](std::size_t slot, const Tile&) {
+    ratios.push_back(1.0 +
+                     static_cast<double>(store_.volume[slot / kLanes].change.value()[static_cast<int>(slot % kLanes)]));
+  });
+  return ratios;
+}
+
+template <class P>
+double HostEngine<P>::elastic_energy() const {
+  if (!setup_.effects.shear) return 0.0;
+  double energy = 0.0;
+  for_each_particle([&](std::size_t slot, const Tile&) {
+    const MaterialParameters& m = setup_.materials[material(slot)];
+    const double norm = hencky_norm(slot);
+    const double mass = static_cast<double>(store_.kinematics[slot / kLanes].mass[static_cast<int>(slot % kLanes)]);
+    energy += mass / m.eos.rho0 * m.shear_modulus * norm * norm;
+  });
+  return energy;
+}
+
+template <class P>
+SignalSpeeds HostEngine<P>::signal_speeds() const {
+  SignalSpeeds speeds;
+  for (const Tile& tile : tiles_) {
+    for (std::uint32_t n = 0; n < tile.particles; ++n) {
+      const std::size_t pack = tile.first_pack + n / kLanes;
+      const int lane = static_cast<int>(n % kLanes);
+      const std::size_t slot = pack * kLanes + static_cast<std::size_t>(lane);
+      const auto& c = store_.affine[pack].gradient;
+      material::State<double> state{};
+      state.volume.set(static_cast<double>(store_.volume[pack].change.value()[lane]));
+      if (setup_.effects.energy) state.energy.set(static_cast<double>(store_.energy[pack].specific.value()[lane]));
+      speeds.sound = std::max(
+          speeds.sound, material::longitudinal_sound_speed(setup_.effects, double_constants_[material(slot)], state));
+      for (int axis = 0; axis < 3; ++axis) {
+        speeds.particle =
+            std::max(speeds.particle, std::abs(static_cast<double>(store_.kinematics[pack].velocity[axis][lane])));
+      }
+      speeds.compression_rate =
+          std::max(speeds.compression_rate, -static_cast<double>(c[0][lane] + c[4][lane] + c[8][lane]));
+    }
+  }
+  return {comm_.max(speeds.sound), comm_.max(speeds.particle), comm_.max(speeds.compression_rate)};
+}
+
+template <class P>
+EngineStats HostEngine<P>::stats() const {
+  EngineStats stats;
+  for (const Tile& tile : tiles_) stats.particles += tile.particles;
+  stats.tiles = tiles_.size();
+  stats.blocks = owned_blocks_;
+  stats.halo_bytes_per_step = halo_.bytes_per_step();
+  for (int g = 0; g < kGroupCount; ++g) {
+    if (store_.has(static_cast<Group>(g))) {
+      stats.particle_bytes += store_.packs() * ParticleStore<P>::stride(static_cast<Group>(g));
+    }
+  }
+  stats.particle_bytes += flaw_thresholds_.capacity() * sizeof(float);
+  stats.grid_bytes = (sums_.capacity() + velocities_.capacity()) * sizeof(Real);
+  return stats;
+}
+
+template class HostEngine<MixedPrecision>;
+template class HostEngine<DoublePrecision>;
+
+}  // namespace breccia::grid

@@ -1,0 +1,237 @@
+// Sorting: every particle to the rank that owns its block, to its tile, and inside the tile to the order of its cell.
+#include <algorithm>
+#include <cstring>
+#include <numeric>
+#include <string>
+#include <utility>
+
+#include "breccia/error.hpp"
+#include "grid/host_engine.hpp"
+
+namespace breccia::grid {
+namespace {
+
+constexpr std::int32_t floor_div4(std::int32_t n) { return n >> 2; }
+
+constexpr BlockCoord block_of(const std::int32_t (&node)[3]) {
+  return {floor_div4(node[0]), floor_div4(node[1]), floor_div4(node[2])};
+}
+
+// Cells of a block in storage order: z slowest, so that consecutive particles write to different rows of nodes.
+constexpr std::uint32_t cell_in_block(const std::int32_t (&node)[3]) {
+  return static_cast<std::uint32_t>(((node[2] & 3) * 4 + (node[1] & 3)) * 4 + (node[0] & 3));
+}
+
+constexpr std::int32_t tile_node(const std::int32_t (&node)[3]) {
+  return ((node[0] & 3) + kNodeBias) | (((node[1] & 3) + kNodeBias) << 8) | (((node[2] & 3) + kNodeBias) << 16);
+}
+
+// Reads and writes plain values in a message.
+template <class T>
+void put(std::vector<std::byte>& message, const T* values, std::size_t count) {
+  const auto* bytes = reinterpret_cast<const std::byte*>(values);
+  message.insert(message.end(), bytes, bytes + count * sizeof(T));
+}
+template <class T>
+void get(const std::byte*& from, T* values, std::size_t count) {
+  std::memcpy(values, from, count * sizeof(T));
+  from += count * sizeof(T);
+}
+
+}  // namespace
+
+template <class P>
+std::vector<Placement> HostEngine<P>::place_all() const {
+  std::vector<Placement> placements;
+  for_each_particle([&](std::size_t slot, const Tile& tile) {
+    const BlockCoord block = block_coord(blocks_.keys()[tile.block]);
+    const std::int32_t packed = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
+    Placement p{static_cast<std::uint32_t>(slot), {}};
+    for (int axis = 0; axis < 3; ++axis) {
+      const std::int32_t node = kBlockWidth * component(block, axis) + ((packed >> (8 * axis)) & 255) - kNodeBias;
+      const std::int32_t wrapped = periodicity_.wrap(floor_div4(node), axis);
+      if (wrapped > kBlockLimit || wrapped < -kBlockLimit) {
+        throw NumericsError("particle " + std::to_string(id(slot)) + " is more than 4 million cells from the origin");
+      }
+      p.node[axis] = kBlockWidth * wrapped + (node & 3);
+    }
+    placements.push_back(p);
+  });
+  return placements;
+}
+
+template <class P>
+void HostEngine<P>::sort() {
+  if (comm_.any(strayed_packs_ != 0)) {
+    throw NumericsError(
+        "particles moved more than a cell between two sortings: the run is unstable, or numerics.sort_interval is too "
+        "long for its speeds");
+  }
+  settle(place_all());
+}
+
+template <class P>
+void HostEngine<P>::settle(std::vector<Placement> placements) {
+  if (!slabs_chosen_) choose_slabs(placements);
+  migrate(placements);
+  arrange(placements);
+  connect_tiles();
+  connect_halo();
+  colour_tiles();
+}
+
+template <class P>
+void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
+  // Along the longest extent of the matter: fewest shared nodes.
+  std::int32_t low[3] = {INT32_MAX, INT32_MAX, INT32_MAX};
+  std::int32_t high[3] = {INT32_MIN, INT32_MIN, INT32_MIN};
+  for (const Placement& p : placements) {
+    for (int axis = 0; axis < 3; ++axis) {
+      low[axis] = std::min(low[axis], p.node[axis]);
+      high[axis] = std::max(high[axis], p.node[axis]);
+    }
+  }
+  int longest = 0;
+  std::int64_t extent = -1;
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int64_t length = std::int64_t{comm_.max(high[axis])} - comm_.min(low[axis]);
+    if (length > extent) {
+      extent = length;
+      longest = axis;
+    }
+  }
+  mpi::PlaneWork work;
+  for (const Placement& p : placements) ++work[floor_div4(p.node[longest])];
+  slabs_ = mpi::Slabs::balanced(longest, work, comm_);
+  slabs_chosen_ = true;
+}
+
+template <class P>
+void HostEngine<P>::migrate(std::vector<Placement>& placements) {
+  if (comm_.size() == 1) return;
+  const bool with_flaws = store_.has(Group::kFlaws);
+  const std::size_t bytes = store_.record_bytes();
+  std::vector<std::vector<std::byte>> to(static_cast<std::size_t>(comm_.size()));
+  std::vector<std::byte> record(bytes);
+  std::erase_if(placements, [&](const Placement& p) {
+    const int rank = owner(block_of(p.node));
+    if (rank == comm_.rank()) return false;
+    auto& message = to[static_cast<std::size_t>(rank)];
+    put(message, p.node, 3);
+    store_.read_record(p.slot, record.data());
+    put(message, record.data(), bytes);
+    if (with_flaws) {
+      const Flaws<P>& f = store_.flaws[p.slot / kLanes];
+      const int lane = static_cast<int>(p.slot % kLanes);
+      put(message, flaw_thresholds_.data() + f.first[lane], static_cast<std::size_t>(f.count[lane] >> 16));
+    }
+    return true;
+  });
+  for (const std::vector<std::byte>& message : comm_.alltoall(to)) {
+    const std::byte* from = message.data();
+    const std::byte* const end = from + message.size();
+    while (from != end) {
+      // A pack at a time: slots are cheap until arrange() closes the gaps.
+      const std::size_t slot = store_.packs() * kLanes;
+      store_.append_packs(1);
+      for (std::size_t lane = 0; lane < kLanes && from != end; ++lane) {
+        Placement p{static_cast<std::uint32_t>(slot + lane), {}};
+        get(from, p.node, 3);
+        store_.write_record(p.slot, from);
+        from += bytes;
+        if (with_flaws) {
+          Flaws<P>& f = store_.flaws[p.slot / kLanes];
+          const auto count = static_cast<std::size_t>(f.count[static_cast<int>(lane)] >> 16);
+          f.first.set(static_cast<int>(lane), static_cast<std::int32_t>(flaw_thresholds_.size()));
+          flaw_thresholds_.resize(flaw_thresholds_.size() + count);
+          get(from, flaw_thresholds_.data() + flaw_thresholds_.size() - count, count);
+        }
+        placements.push_back(p);
+      }
+    }
+  }
+}
+
+template <class P>
+void HostEngine<P>::arrange(std::span<const Placement> placements) {
+  // Tiles as they are met, then in the order of their keys; a counting sort over (tile, cell) is stable.
+  blocks_.clear();
+  std::vector<std::uint32_t> met(placements.size());
+  for (std::size_t i = 0; i < placements.size(); ++i) met[i] = blocks_.insert(block_key(block_of(placements[i].node)));
+  const std::vector<BlockKey> keys = blocks_.keys();
+  std::vector<std::uint32_t> by_key(keys.size());
+  std::iota(by_key.begin(), by_key.end(), 0U);
+  std::sort(by_key.begin(), by_key.end(), [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
+  std::vector<std::uint32_t> rank(keys.size());
+  for (std::uint32_t r = 0; r < by_key.size(); ++r) rank[by_key[r]] = r;
+
+  std::vector<std::uint32_t> place(keys.size() * kBlockNodes, 0U);
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    ++place[rank[met[i]] * kBlockNodes + cell_in_block(placements[i].node)];
+  }
+  tiles_.assign(keys.size(), Tile{});
+  std::uint32_t packs = 0;
+  for (std::uint32_t t = 0; t < tiles_.size(); ++t) {
+    tiles_[t].block = t;
+    tiles_[t].first_pack = packs;
+    std::uint32_t slot = packs * static_cast<std::uint32_t>(kLanes);
+    for (std::uint32_t c = 0; c < kBlockNodes; ++c) {
+      const std::uint32_t count = std::exchange(place[t * kBlockNodes + c], slot);
+      slot += count;
+      tiles_[t].particles += count;
+    }
+    packs += (tiles_[t].particles + static_cast<std::uint32_t>(kLanes) - 1) / static_cast<std::uint32_t>(kLanes);
+  }
+  std::vector<std::uint32_t> source(packs * kLanes, ParticleStore<P>::kEmpty);
+  std::vector<std::int32_t> node(source.size(), tile_node({0, 0, 0}));
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    const std::uint32_t slot = place[rank[met[i]] * kBlockNodes + cell_in_block(placements[i].node)]++;
+    source[slot] = placements[i].slot;
+    node[slot] = tile_node(placements[i].node);
+  }
+  store_.gather(source);
+  for (std::size_t s = 0; s < node.size(); ++s)
+    store_.kinematics[s / kLanes].node.set(static_cast<int>(s % kLanes), node[s]);
+  blocks_.clear();
+  for (const std::uint32_t b : by_key) blocks_.insert(keys[b]);
+  if (store_.has(Group::kFlaws)) compact_flaws();
+}
+
+template <class P>
+void HostEngine<P>::compact_flaws() {
+  std::size_t live = 0;
+  for_each_particle([&](std::size_t slot, const Tile&) {
+    live += static_cast<std::size_t>(store_.flaws[slot / kLanes].count[static_cast<int>(slot % kLanes)] >> 16);
+  });
+  if (flaw_thresholds_.size() <= 2 * live) return;
+  std::vector<float> kept;
+  kept.reserve(live);
+  for_each_particle([&](std::size_t slot, const Tile&) {
+    Flaws<P>& f = store_.flaws[slot / kLanes];
+    const int lane = static_cast<int>(slot % kLanes);
+    const auto first = flaw_thresholds_.begin() + f.first[lane];
+    f.first.set(lane, static_cast<std::int32_t>(kept.size()));
+    kept.insert(kept.end(), first, first + (f.count[lane] >> 16));
+  });
+  flaw_thresholds_ = std::move(kept);
+}
+
+template <class P>
+bool HostEngine<P>::finish_damage() {
+  if (!setup_.effects.damage) return true;
+  bool all_broken = true;
+  for_each_particle([&](std::size_t slot, const Tile&) {
+    all_broken = all_broken && store_.damage_level[slot / kLanes].root[static_cast<int>(slot % kLanes)] >= Real(1);
+  });
+  if (comm_.any(!all_broken)) return false;
+  setup_.effects.damage = false;
+  setup_.effects.fully_damaged = true;
+  store_.drop_damage();
+  flaw_thresholds_ = {};
+  return true;
+}
+
+template class HostEngine<MixedPrecision>;
+template class HostEngine<DoublePrecision>;
+
+}  // namespace breccia::grid

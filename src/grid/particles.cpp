@@ -1,0 +1,225 @@
+#include "grid/particles.hpp"
+
+#include <cstring>
+
+namespace breccia::grid {
+namespace {
+
+template <class T>
+std::vector<T> gathered(const std::vector<T>& old, std::span<const std::uint32_t> source, std::size_t lanes,
+                        std::span<const FieldDescriptor> table, Group group) {
+  std::vector<T> result(source.size() / lanes);
+  std::memset(static_cast<void*>(result.data()), 0, result.size() * sizeof(T));
+  const auto* from = reinterpret_cast<const std::byte*>(old.data());
+  auto* to = reinterpret_cast<std::byte*>(result.data());
+  for (const FieldDescriptor& field : table) {
+    if (field.group != group) continue;
+    const auto element = static_cast<std::size_t>(field.element_bytes);
+    const std::size_t pack_bytes = element * lanes;
+    for (std::size_t s = 0; s < source.size(); ++s) {
+      if (source[s] == ParticleStore<MixedPrecision>::kEmpty) continue;
+      const std::byte* a = from + source[s] / lanes * sizeof(T) + field.offset + source[s] % lanes * element;
+      std::byte* b = to + s / lanes * sizeof(T) + field.offset + s % lanes * element;
+      for (int c = 0; c < field.components; ++c) {
+        if (element == 4) {
+          std::memcpy(b, a, 4);
+        } else {
+          std::memcpy(b, a, 8);
+        }
+        a += pack_bytes;
+        b += pack_bytes;
+      }
+    }
+  }
+  return result;
+}
+
+template <class P>
+std::vector<FieldDescriptor> make_fields() {
+  constexpr int real = sizeof(typename P::Real);
+  constexpr int offset = sizeof(typename P::Offset);
+  constexpr int accumulated =
+      static_cast<int>(sizeof(Accumulator<typename P::RealPack>) / sizeof(typename P::RealPack));
+  using K = Kinematics<P>;
+  using V = Volume<P>;
+  using F = Flaws<P>;
+  using I = Identity<P>;
+  return {
+      {"offset", "cell", "position inside the cell, from the nearest node", Group::kKinematics, offsetof(K, offset),
+       offset, 3},
+      {"node", "", "nearest node inside the tile, 3 x 8 bits", Group::kKinematics, offsetof(K, node), 4, 1},
+      {"velocity", "m/s", "velocity at the half step", Group::kKinematics, offsetof(K, velocity), real, 3},
+      {"mass", "kg", "mass", Group::kKinematics, offsetof(K, mass), real, 1},
+      {"volume_change", "", "J - 1, as a sum without loss", Group::kVolume, offsetof(V, change), real, accumulated},
+      {"kirchhoff_pressure", "Pa", "J P of the last stress", Group::kVolume, offsetof(V, kirchhoff_pressure), real, 1},
+      {"elastic_strain", "", "b_e / (tr b_e / 3) - I, traceless", Group::kElastic, 0, real, 5},
+      {"internal_energy", "J/kg", "specific internal energy, as a sum without loss", Group::kEnergy, 0, real,
+       accumulated},
+      {"damage_root", "", "cube root of the damage", Group::kDamageLevel, 0, real, 1},
+      {"total_strain", "", "F F^T - I of the total deformation", Group::kFlaws, offsetof(F, total), real, 6},
+      {"next_threshold", "", "strain that activates the next flaw", Group::kFlaws, offsetof(F, next_threshold), real,
+       1},
+      {"flaw_first", "", "place of the flaws in the arena of this rank", Group::kFlaws, offsetof(F, first), 4, 1},
+      {"flaw_count", "", "active + 65536 * all", Group::kFlaws, offsetof(F, count), 4, 1},
+      {"gravity", "m/s2", "acceleration held over the window", Group::kGravity, 0, real, 3},
+      {"id_low", "", "global id, low half", Group::kIdentity, offsetof(I, id_low), 4, 1},
+      {"id_high", "", "global id, high half", Group::kIdentity, offsetof(I, id_high), 4, 1},
+      {"body_material", "", "body + 65536 * material", Group::kIdentity, offsetof(I, body_material), 4, 1},
+      {"velocity_gradient", "1/s", "C at the half step", Group::kAffine, 0, real, 9},
+  };
+}
+
+}  // namespace
+
+template <class P>
+std::span<const FieldDescriptor> fields() {
+  static const std::vector<FieldDescriptor> table = make_fields<P>();
+  return table;
+}
+
+template <class P>
+bool ParticleStore<P>::has(Group group) const {
+  switch (group) {
+    case Group::kElastic:
+      return groups_.elastic;
+    case Group::kEnergy:
+      return groups_.energy;
+    case Group::kDamageLevel:
+      return groups_.damage_level;
+    case Group::kFlaws:
+      return groups_.flaws;
+    case Group::kGravity:
+      return groups_.gravity;
+    default:
+      return true;
+  }
+}
+
+template <class P>
+template <class F>
+void ParticleStore<P>::for_each_group(F&& visit) {
+  visit(Group::kKinematics, kinematics);
+  visit(Group::kVolume, volume);
+  if (groups_.elastic) visit(Group::kElastic, elastic);
+  if (groups_.energy) visit(Group::kEnergy, energy);
+  if (groups_.damage_level) visit(Group::kDamageLevel, damage_level);
+  if (groups_.flaws) visit(Group::kFlaws, flaws);
+  if (groups_.gravity) visit(Group::kGravity, gravity);
+  visit(Group::kIdentity, identity);
+  visit(Group::kAffine, affine);
+}
+
+template <class P>
+void ParticleStore<P>::allocate(std::size_t packs) {
+  for_each_group([&](Group, auto& array) {
+    array.resize(packs);
+    std::memset(static_cast<void*>(array.data()), 0, packs * sizeof(array[0]));
+  });
+}
+
+template <class P>
+void ParticleStore<P>::append_packs(std::size_t count) {
+  for_each_group([&](Group, auto& array) {
+    const std::size_t old = array.size();
+    array.resize(old + count);
+    std::memset(static_cast<void*>(array.data() + old), 0, count * sizeof(array[0]));
+  });
+}
+
+template <class P>
+void ParticleStore<P>::drop_damage() {
+  groups_.flaws = false;
+  groups_.damage_level = false;
+  flaws = {};
+  damage_level = {};
+}
+
+template <class P>
+std::byte* ParticleStore<P>::data(Group group) {
+  std::byte* result = nullptr;
+  for_each_group([&](Group g, auto& array) {
+    if (g == group) result = reinterpret_cast<std::byte*>(array.data());
+  });
+  return result;
+}
+
+template <class P>
+std::size_t ParticleStore<P>::stride(Group group) {
+  switch (group) {
+    case Group::kKinematics:
+      return sizeof(Kinematics<P>);
+    case Group::kVolume:
+      return sizeof(Volume<P>);
+    case Group::kElastic:
+      return sizeof(Elastic<P>);
+    case Group::kEnergy:
+      return sizeof(Energy<P>);
+    case Group::kDamageLevel:
+      return sizeof(DamageLevel<P>);
+    case Group::kFlaws:
+      return sizeof(Flaws<P>);
+    case Group::kGravity:
+      return sizeof(HeldGravity<P>);
+    case Group::kIdentity:
+      return sizeof(Identity<P>);
+    case Group::kAffine:
+      return sizeof(Affine<P>);
+  }
+  return 0;
+}
+
+template <class P>
+std::size_t ParticleStore<P>::bytes_per_particle(const GroupSet& groups) {
+  const ParticleStore probe(groups);
+  std::size_t bytes = 0;
+  for (int g = 0; g < kGroupCount; ++g) {
+    if (probe.has(static_cast<Group>(g))) bytes += stride(static_cast<Group>(g));
+  }
+  return bytes / kLanes;
+}
+
+template <class P>
+void ParticleStore<P>::gather(std::span<const std::uint32_t> source) {
+  for_each_group([&](Group group, auto& array) { array = gathered(array, source, kLanes, fields<P>(), group); });
+}
+
+template <class P>
+std::size_t ParticleStore<P>::record_bytes() const {
+  std::size_t bytes = 0;
+  for (const FieldDescriptor& field : fields<P>()) {
+    if (has(field.group)) bytes += static_cast<std::size_t>(field.element_bytes * field.components);
+  }
+  return bytes;
+}
+
+template <class P>
+void ParticleStore<P>::read_record(std::size_t slot, std::byte* record) {
+  for (const FieldDescriptor& field : fields<P>()) {
+    if (!has(field.group)) continue;
+    const auto element = static_cast<std::size_t>(field.element_bytes);
+    const std::byte* lane =
+        data(field.group) + slot / kLanes * stride(field.group) + field.offset + slot % kLanes * element;
+    for (int c = 0; c < field.components; ++c, record += element, lane += element * kLanes) {
+      std::memcpy(record, lane, element);
+    }
+  }
+}
+
+template <class P>
+void ParticleStore<P>::write_record(std::size_t slot, const std::byte* record) {
+  for (const FieldDescriptor& field : fields<P>()) {
+    if (!has(field.group)) continue;
+    const auto element = static_cast<std::size_t>(field.element_bytes);
+    std::byte* lane = data(field.group) + slot / kLanes * stride(field.group) + field.offset + slot % kLanes * element;
+    for (int c = 0; c < field.components; ++c, record += element, lane += element * kLanes) {
+      std::memcpy(lane, record, element);
+    }
+  }
+}
+
+template std::span<const FieldDescriptor> fields<MixedPrecision>();
+template std::span<const FieldDescriptor> fields<DoublePrecision>();
+template class ParticleStore<MixedPrecision>;
+template class ParticleStore<DoublePrecision>;
+
+}  // namespace breccia::grid

@@ -1,0 +1,117 @@
+// The tile: the particles of one block and the 8x8x8 nodes they can reach. Plain data shared by the engine and the
+// kernel files.
+#pragma once
+
+#include <cstdint>
+
+#include "grid/particles.hpp"
+#include "material/constitutive.hpp"
+
+namespace breccia::grid {
+
+inline constexpr int kBlockWidth = 4;  ///< nodes along an edge of a block
+inline constexpr int kBlockNodes = 64;
+inline constexpr int kTileMargin = 2;  ///< stencil (1) and drift between two sortings (1)
+inline constexpr int kTileWidth = kBlockWidth + 2 * kTileMargin;
+inline constexpr int kTileNodes = kTileWidth * kTileWidth * kTileWidth;
+inline constexpr int kNodeBias = 8;  ///< keeps the 8-bit tile coordinates positive
+inline constexpr std::uint32_t kNoBlock = 0xffffffffU;
+
+/// Channels of a node. Sums while particles scatter, velocities after the grid update.
+inline constexpr int kChannels = 8;
+enum SumChannel { kMomentum = 0, kForce = 3, kMass = 6 };
+enum VelocityChannel { kNewVelocity = 0, kOldVelocity = 3 };  // kMass stays where it is
+
+template <class P>
+using Node = Pack<typename P::Real, kChannels>;
+
+struct Tile {
+  std::uint32_t block = 0;  ///< index of its own block
+  std::uint32_t first_pack = 0;
+  std::uint32_t particles = 0;
+  std::uint32_t neighbours[27];  ///< block indices, x slowest; kNoBlock where it reaches no node
+};
+
+/// What a pass over a tile found.
+struct TileReport {
+  double plastic_work = 0.0;  ///< [J]
+  double viscous_work = 0.0;  ///< [J]
+  double largest_move = 0.0;  ///< largest |dx| along an axis [cells]
+  std::uint32_t strayed = 0;  ///< particles found outside the margin
+};
+
+/// Velocity transfer (physics.md 5): d = alpha (v_p - v_old); v_p = v_new + d; x += dt (v_new + beta d).
+struct TransferParameters {
+  double alpha = 0.995;
+  double beta = 1.0;
+  bool affine = true;  ///< C enters P2G (APIC, ASFLIP); off: FLIP
+};
+
+/// Everything a pass reads and writes, as plain pointers: kernel files hold no containers.
+template <class P>
+struct PassArguments {
+  using Real = typename P::Real;
+
+  const Tile* tiles = nullptr;
+  Kinematics<P>* kinematics = nullptr;
+  Volume<P>* volume = nullptr;
+  Elastic<P>* elastic = nullptr;
+  Energy<P>* energy = nullptr;
+  DamageLevel<P>* damage_level = nullptr;
+  Flaws<P>* flaws = nullptr;
+  HeldGravity<P>* gravity = nullptr;  ///< null: no self-gravity
+  Identity<P>* identity = nullptr;
+  Affine<P>* affine = nullptr;
+
+  const Real* velocities = nullptr;        ///< [blocks][64][8], VelocityChannel
+  Real* sums = nullptr;                    ///< [blocks][64][8], SumChannel
+  const float* flaw_thresholds = nullptr;  ///< arena of this rank
+  const material::Constants<Real>* materials = nullptr;
+  int material_count = 1;
+  material::RuntimeEffects effects;
+
+  Real cell = 0;
+  Real step = 0;              ///< dt of the drift and of the strain push [s]
+  Real stress_half_step = 0;  ///< half the dt over which C was the velocity gradient [s]
+  Vec3<Real> uniform_gravity{};
+  TransferParameters transfer;
+
+  bool gather = true;   ///< G2P and particle update
+  bool scatter = true;  ///< stress and P2G
+};
+
+/// What the output step reads from the grid, without changing anything.
+template <class P>
+struct ProbeArguments {
+  using Real = typename P::Real;
+  const Tile* tiles = nullptr;
+  const Kinematics<P>* kinematics = nullptr;
+  const Real* velocities = nullptr;
+  TransferParameters transfer;
+  Real* new_velocity = nullptr;  ///< [slots][3] v_p^{n+1/2}
+  Real* node_mass = nullptr;     ///< [slots] sum of w m_i
+};
+
+/// Grid update of whole blocks: sums to velocities, sums cleared.
+template <class P>
+struct NodeArguments {
+  using Real = typename P::Real;
+  Real* sums = nullptr;
+  Real* velocities = nullptr;
+  Real kick = 0;           ///< dt of the kick [s]
+  Real smallest_mass = 0;  ///< nodes with less are empty (hard case 2) [kg]
+};
+
+/// The entry points one instruction set provides.
+template <class P>
+struct Kernels {
+  void (*pass)(const PassArguments<P>&, std::uint32_t tile, TileReport&);
+  void (*probe)(const ProbeArguments<P>&, std::uint32_t tile);
+  void (*update_blocks)(const NodeArguments<P>&, std::uint32_t first_block, std::uint32_t last_block);
+};
+
+/// Kernels of the running processor.
+template <class P>
+const Kernels<P>& active_kernels();
+
+}  // namespace breccia::grid

@@ -1,0 +1,44 @@
+#include "io/output_folder.hpp"
+
+#include <fmt/format.h>
+
+#include <system_error>
+
+#include "breccia/error.hpp"
+#include "io/collectively.hpp"
+#include "io/durable_file.hpp"
+
+namespace breccia::io {
+
+namespace {
+
+namespace fs = std::filesystem;
+
+void require_empty(const fs::path& folder) {
+  std::error_code error;
+  const fs::directory_iterator entry(folder, error);
+  if (error) throw IoError(fmt::format("output folder {}: cannot be read: {}", folder.string(), error.message()));
+  if (entry == fs::directory_iterator()) return;
+  throw UsageError(fmt::format("output folder {} is not empty (it holds {}): name another one with --out, or empty it",
+                               folder.string(), entry->path().filename().string()));
+}
+
+void require_writable(const fs::path& folder) {
+  const fs::path probe = folder / "probe";
+  write_file(probe, "");
+  fs::remove(probe);
+}
+
+}  // namespace
+
+void prepare_output_folder(const fs::path& folder, const mpi::Comm& comm) {
+  on_root(comm, [&] {
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error) throw IoError(fmt::format("output folder {}: cannot be created: {}", folder.string(), error.message()));
+    require_empty(folder);
+    require_writable(folder);
+  });
+}
+
+}  // namespace breccia::io

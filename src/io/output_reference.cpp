@@ -1,0 +1,51 @@
+#include "io/output_reference.hpp"
+
+#include <fmt/format.h>
+
+#include "io/diagnostics.hpp"
+#include "io/fields.hpp"
+
+namespace breccia::io {
+
+namespace {
+
+constexpr const char* kText = R"(# Output files
+
+Everything is in SI units. Files appear under their name only when they are complete.
+The tables of this page are made by the program; a test keeps them in step.
+
+## `snap_NNNN.hdf`
+
+One HDF5 file per output time, always one at the start and one at the end. ParaView (5.11 and later) and PyVista open it as
+it is: it is a VTKHDF `UnstructuredGrid` of version 1.0 with one vertex cell per particle. `run.hdf.series` lists the
+snapshots with their times; open that one for a time series. Particles stand in the order of `ParticleIDs`, so files do not
+depend on the number of ranks. `/PartType0` holds the same datasets under the names below (hard links), each with the
+attributes `Units` and `Description`. A field whose effect is off is left out.
+
+{fields}
+`/Header` has the attributes `Time` [s], `Step`, `CellSize` [m], `TargetMass` (heaviest initial body) [kg], `Period` (three
+lengths of the periodic domain, 0 where it is not periodic) [m], `NumberOfParticles`, `Fields`, `SceneName`, `CodeName` and
+`CodeVersion`; `/Parameters/Scene` is the text of the scene file; `/Units` says SI.
+
+## `diagnostics.csv`
+
+One line per output step. The first line names the columns with their units; numbers have the 17 digits that give the
+double precision value back exactly.
+
+{diagnostics}
+## `summary.json`
+
+Written at the end: `particles`, `steps`, `simulated_time` [s], `wall_seconds`, `ranks`, `threads`, `device`, `precision`,
+`particle_steps_per_second`; `conservation` with the drifts of `mass` (over the total mass), `momentum` (over sum m |v|),
+`angular_momentum` (over sum m |x cross v|) and `energy` (over max(kinetic + |potential|)); `damaged_fraction`; `remnants`,
+largest first; `stages` with the wall time of each stage of the step; `versions`; `machine`; `scene`, every key as resolved;
+`used` and `unused`, the keys of the scene that had and had not an effect.
+)";
+
+}  // namespace
+
+std::string output_reference() {
+  return fmt::format(kText, fmt::arg("fields", fields_table()), fmt::arg("diagnostics", diagnostics_table()));
+}
+
+}  // namespace breccia::io

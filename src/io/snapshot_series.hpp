@@ -1,0 +1,19 @@
+// The list of a run's snapshots with their times, which ParaView and PyVista read as one time series.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <string>
+
+#include "mpi/comm.hpp"
+
+namespace breccia::io {
+
+/// "snap_0007.hdf": at least four digits.
+std::string snapshot_name(std::uint64_t number);
+
+/// Enters snapshot `name` at `time` [s] into run.hdf.series in `folder`, in place of an older entry of that name;
+/// the other entries stay. The file is replaced in one go. Collective. Throws IoError, the same on all ranks.
+void add_to_series(const std::filesystem::path& folder, const std::string& name, double time, const mpi::Comm& comm);
+
+}  // namespace breccia::io

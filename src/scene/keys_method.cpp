@@ -1,0 +1,212 @@
+// Keys of [effects], [gravity], [numerics] and [output].
+#include "scene/keys.hpp"
+
+namespace breccia::scene {
+
+namespace {
+
+// Order of Switch.
+const std::vector<std::string_view> kSwitch{"false", "true", "auto"};
+
+std::vector<Key> effects() {
+  return {
+      {"effects.gravity",
+       kPure,
+       kAny,
+       {"off", "direct", "tree", "treepm", "auto"},
+       "",
+       "",
+       "self-gravity: this build has the direct sum; auto takes it unless G M/(R c0^2) < 1e-9",
+       [](Draft& d, std::size_t) { return choice(d.scene.effects.gravity); }},
+      {"effects.shear", kPure, kAny, kSwitch, "", "", "shear stress; off leaves pressure only; auto: on unless mu = 0",
+       [](Draft& d, std::size_t) { return choice(d.scene.effects.shear); }},
+      {"effects.strength", kPure, kAny, kSwitch, "", "",
+       "yield and friction; off is elastic without limit; auto: as shear",
+       [](Draft& d, std::size_t) { return choice(d.scene.effects.strength); }},
+      {"effects.damage", kPure, kAny, kSwitch, "", "",
+       "flaws and crack growth; auto: on while a particle is below damage 1",
+       [](Draft& d, std::size_t) { return choice(d.scene.effects.damage); }},
+      {"effects.viscosity", kPure, kAny, kSwitch, "", "", "artificial viscosity; auto: on",
+       [](Draft& d, std::size_t) { return choice(d.scene.effects.viscosity); }},
+      {"effects.energy", kPure, kAny, kSwitch, "", "", "internal energy and its pressure; auto: on",
+       [](Draft& d, std::size_t) { return choice(d.scene.effects.energy); }},
+  };
+}
+
+std::vector<Key> gravity() {
+  return {
+      {"gravity.interval",
+       kPure,
+       {1.0, 4096.0},
+       {},
+       "",
+       "",
+       "steps between two evaluations of self-gravity",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.gravity.interval; }},
+      {"gravity.softening",
+       kLength,
+       kNonNegative,
+       {},
+       "",
+       "0.05 grid.cell",
+       "Plummer softening length",
+       [](Draft& d, std::size_t) -> Slot { return &d.softening; }},
+      {"gravity.uniform",
+       kAcceleration,
+       kAny,
+       {},
+       "",
+       "",
+       "constant field added to self-gravity",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.gravity.uniform; }},
+  };
+}
+
+std::vector<Key> numerics() {
+  return {
+      {"numerics.precision",
+       kPure,
+       kAny,
+       {"mixed", "double"},
+       "",
+       "",
+       "arithmetic of the engine",
+       [](Draft& d, std::size_t) { return choice(d.scene.numerics.precision); }},
+      {"numerics.transfer",
+       kPure,
+       kAny,
+       {"asflip", "apic", "flip"},
+       "",
+       "",
+       "grid to particle transfer",
+       [](Draft& d, std::size_t) { return choice(d.scene.numerics.transfer); }},
+      {"numerics.asflip_alpha",
+       kPure,
+       kFraction,
+       {},
+       "",
+       "",
+       "ASFLIP: share of the particle's own velocity kept",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.asflip_alpha; }},
+      {"numerics.asflip_beta",
+       kPure,
+       kFraction,
+       {},
+       "",
+       "",
+       "ASFLIP: share of that correction that also moves the particle",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.asflip_beta; }},
+      {"numerics.sort_interval",
+       kPure,
+       {1.0, 4096.0},
+       {},
+       "",
+       "",
+       "most steps between two sortings of the particles",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.sort_interval; }},
+      {"numerics.cap_damaged_yield",
+       kPure,
+       kAny,
+       {},
+       "",
+       "",
+       "strength of damaged rock never above that of intact rock; false is literal",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.literal.cap_damaged_yield; }},
+      {"numerics.linear_tension",
+       kPure,
+       kAny,
+       {},
+       "",
+       "",
+       "Lundborg strength linear in tension, without its pole; false is literal",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.literal.linear_tension; }},
+      {"numerics.viscosity_in_yield",
+       kPure,
+       kAny,
+       {},
+       "",
+       "",
+       "artificial viscosity counts in the pressure of the strength (literal)",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.literal.viscosity_in_yield; }},
+      {"numerics.volume_ratio_max",
+       kPure,
+       {1.0, 1.0e6, true, false},
+       {},
+       "",
+       "",
+       "volume ratio J of a lone expanding particle stops here",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.literal.volume_ratio_max; }},
+  };
+}
+
+std::vector<Key> output() {
+  return {
+      {"output.snapshots",
+       kTime,
+       kPositive,
+       {},
+       "start and end",
+       "",
+       "snapshots in between: \"every 1000 s\"; the first and last state are always written",
+       [](Draft& d, std::size_t) -> Slot {
+         double& interval = d.scene.output.snapshot_interval;
+         const auto seconds = interval > 0.0 ? std::optional(interval) : std::nullopt;
+         return IntervalSlot{seconds, [&interval](double s) { interval = s; }};
+       }},
+      {"output.diagnostics",
+       kTime,
+       kPositive,
+       {},
+       "",
+       "every scene.end/200",
+       "rows of diagnostics.csv: \"every 100 s\"",
+       [](Draft& d, std::size_t) -> Slot {
+         return IntervalSlot{d.diagnostics, [&d](double s) { d.diagnostics = s; }};
+       }},
+      {"output.fields",
+       kPure,
+       kAny,
+       {},
+       "",
+       "all there are",
+       "fields of the snapshots by their name in the file",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.output.fields; }},
+      {"output.analysis",
+       kTime,
+       kNonNegative,
+       {},
+       "",
+       "none",
+       "times of an analysis of the fragments, besides the end",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.output.analysis_times; }},
+      {"output.link",
+       kPure,
+       kPositive,
+       {},
+       "",
+       "",
+       "friends-of-friends linking length of the analysis, in cells",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.output.link_cells; }},
+  };
+}
+
+}  // namespace
+
+std::vector<Key> method_keys() {
+  std::vector<Key> keys = effects();
+  for (auto part : {gravity(), numerics(), output()})
+    for (Key& key : part) keys.push_back(std::move(key));
+  return keys;
+}
+
+std::span<const Key> key_table() {
+  static const std::vector<Key> table = [] {
+    std::vector<Key> keys = run_keys();
+    for (auto part : {material_keys(), body_keys(), method_keys()})
+      for (Key& key : part) keys.push_back(std::move(key));
+    return keys;
+  }();
+  return table;
+}
+
+}  // namespace breccia::scene

@@ -1,0 +1,147 @@
+#include "sim/diagnostics.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "breccia/error.hpp"
+
+namespace breccia::sim {
+namespace {
+
+double length(Vec3d v) { return std::sqrt(dot(v, v)); }
+
+// Sum of m phi / 2 over this rank's particles.
+double self_gravity_energy(gravity::Solver& solver, const ParticleOutput& p) {
+  std::vector<Vec3d> acceleration(p.size());
+  std::vector<double> potential(p.size());
+  solver.evaluate({p.position, p.mass}, acceleration, potential);
+  double energy = 0.0;
+  for (std::size_t i = 0; i < p.size(); ++i) energy += 0.5 * p.mass[i] * potential[i];
+  return energy;
+}
+
+// Sums over the particles of one rank; a plain array for one reduction.
+enum Sum {
+  kMass,
+  kPx,
+  kPy,
+  kPz,
+  kLx,
+  kLy,
+  kLz,
+  kKinetic,
+  kInternal,
+  kElastic,
+  kPlastic,
+  kViscous,
+  kGravity,
+  kDamaged,
+  kMomentumScale,
+  kAngularScale,
+  kParticles,
+  kBlocks,
+  kSums
+};
+
+}  // namespace
+
+io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput& p, const LostWork& lost) {
+  std::array<double, kSums> s{};
+  double max_speed = 0.0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const Vec3d momentum = p.mass[i] * p.velocity[i];
+    const Vec3d angular = cross(p.position[i], momentum);
+    const double speed = length(p.velocity[i]);
+    s[kMass] += p.mass[i];
+    s[kPx] += momentum.x;
+    s[kPy] += momentum.y;
+    s[kPz] += momentum.z;
+    s[kLx] += angular.x;
+    s[kLy] += angular.y;
+    s[kLz] += angular.z;
+    s[kKinetic] += 0.5 * p.mass[i] * speed * speed;
+    if (!p.internal_energy.empty()) s[kInternal] += p.mass[i] * p.internal_energy[i];
+    s[kGravity] -= p.mass[i] * dot(uniform_gravity_, p.position[i]);
+    s[kDamaged] += p.mass[i] * p.damage[i];
+    s[kMomentumScale] += p.mass[i] * speed;
+    s[kAngularScale] += length(angular);
+    max_speed = std::max(max_speed, speed);
+  }
+  if (solver_ != nullptr) s[kGravity] += self_gravity_energy(*solver_, p);
+  s[kElastic] = engine.elastic_energy();
+  s[kPlastic] = lost.plastic;
+  s[kViscous] = lost.viscous;
+  s[kParticles] = static_cast<double>(p.size());
+  s[kBlocks] = static_cast<double>(engine.stats().blocks);
+  comm_.sum(std::span<double>(s));
+
+  const std::vector<double> ratios = engine.volume_ratios();
+  const auto [low, high] = std::minmax_element(ratios.begin(), ratios.end());
+  io::DiagnosticsRow row;
+  row.particles = static_cast<std::uint64_t>(s[kParticles]);
+  row.mass = s[kMass];
+  row.momentum_x = s[kPx];
+  row.momentum_y = s[kPy];
+  row.momentum_z = s[kPz];
+  row.angular_momentum_x = s[kLx];
+  row.angular_momentum_y = s[kLy];
+  row.angular_momentum_z = s[kLz];
+  row.kinetic_energy = s[kKinetic];
+  row.internal_energy = s[kInternal];
+  row.elastic_energy = s[kElastic];
+  row.plastic_energy = s[kPlastic];
+  row.viscous_energy = s[kViscous];
+  row.gravitational_energy = s[kGravity];
+  row.max_speed = comm_.max(max_speed);
+  row.min_J = comm_.min(ratios.empty() ? HUGE_VAL : *low);
+  row.max_J = comm_.max(ratios.empty() ? -HUGE_VAL : *high);
+  row.damaged_fraction = s[kDamaged] / s[kMass];
+  row.active_blocks = static_cast<std::uint64_t>(s[kBlocks]);
+  row.particles_per_rank_min = comm_.min(static_cast<std::uint64_t>(p.size()));
+  row.particles_per_rank_max = comm_.max(static_cast<std::uint64_t>(p.size()));
+  if (!started_) {
+    first_ = row;
+    started_ = true;
+  }
+  const auto total = [](const io::DiagnosticsRow& r) {
+    return r.kinetic_energy + r.internal_energy + r.gravitational_energy;
+  };
+  row.energy_residual = total(row) - total(first_);
+  check(row);
+  follow(row, s[kMomentumScale], s[kAngularScale]);
+  return row;
+}
+
+void Budget::check(const io::DiagnosticsRow& row) const {
+  if (!std::isfinite(row.kinetic_energy + row.internal_energy + row.elastic_energy + row.min_J + row.max_J)) {
+    throw NumericsError("a particle is not finite any more: the run is unstable; try a smaller time.step or time.cfl");
+  }
+  if (row.particles != first_.particles) {
+    throw NumericsError(fmt::format("{} particles, but {} at the start", row.particles, first_.particles));
+  }
+  if (std::abs(row.mass - first_.mass) > 1e-12 * first_.mass) {
+    throw NumericsError(fmt::format("total mass {:.17g} kg, but {:.17g} kg at the start", row.mass, first_.mass));
+  }
+}
+
+void Budget::follow(const io::DiagnosticsRow& row, double momentum_scale, double angular_scale) {
+  const auto grow = [](double& drift, double change, double scale) {
+    if (scale > 0.0) drift = std::max(drift, change / scale);
+  };
+  energy_scale_ = std::max(energy_scale_, row.kinetic_energy + std::abs(row.gravitational_energy));
+  grow(drift_.mass, std::abs(row.mass - first_.mass), first_.mass);
+  grow(drift_.momentum,
+       length({row.momentum_x - first_.momentum_x, row.momentum_y - first_.momentum_y,
+               row.momentum_z - first_.momentum_z}),
+       momentum_scale);
+  grow(drift_.angular_momentum,
+       length({row.angular_momentum_x - first_.angular_momentum_x, row.angular_momentum_y - first_.angular_momentum_y,
+               row.angular_momentum_z - first_.angular_momentum_z}),
+       angular_scale);
+  grow(drift_.energy, std::abs(row.energy_residual), energy_scale_);
+}
+
+}  // namespace breccia::sim

@@ -1,0 +1,45 @@
+// The conservation budget at one time.
+#pragma once
+
+#include "gravity/solver.hpp"
+#include "grid/engine.hpp"
+#include "io/diagnostics.hpp"
+#include "io/summary.hpp"
+#include "mpi/comm.hpp"
+
+namespace breccia::sim {
+
+/// Work lost to heat since the start, of this rank [J].
+struct LostWork {
+  double plastic = 0.0;
+  double viscous = 0.0;
+};
+
+/// Sums a row over all ranks and follows the drifts from the first row.
+class Budget {
+ public:
+  /// `solver` may be null (no self-gravity). `uniform_gravity` [m/s2].
+  Budget(gravity::Solver* solver, Vec3d uniform_gravity, const mpi::Comm& comm)
+      : solver_(solver), uniform_gravity_(uniform_gravity), comm_(comm) {}
+
+  /// The row at t_n, after Engine::update_grid(). Collective. Throws NumericsError if a sum is not finite or a particle
+  /// or mass is missing; time, step, dt and wall_seconds are left to the caller.
+  io::DiagnosticsRow row(const grid::Engine& engine, const ParticleOutput& particles, const LostWork& lost);
+
+  /// Largest drifts seen so far.
+  [[nodiscard]] const io::Conservation& drift() const { return drift_; }
+
+ private:
+  void check(const io::DiagnosticsRow& row) const;
+  void follow(const io::DiagnosticsRow& row, double momentum_scale, double angular_scale);
+
+  gravity::Solver* solver_;
+  Vec3d uniform_gravity_;
+  mpi::Comm comm_;
+  bool started_ = false;
+  io::DiagnosticsRow first_;
+  double energy_scale_ = 0.0;
+  io::Conservation drift_;
+};
+
+}  // namespace breccia::sim

@@ -1,0 +1,19 @@
+// From a scene to an engine that holds its particles.
+#pragma once
+
+#include <memory>
+
+#include "breccia/scene.hpp"
+#include "grid/engine.hpp"
+#include "sim/effects.hpp"
+
+namespace breccia::sim {
+
+/// An engine with the particles, flaws and spins of the scene. Collective.
+std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
+                                                 const mpi::Comm& comm);
+
+/// Bytes of all fields of a particle, flaw thresholds (mean number) and sorting included, without the grid.
+double bytes_per_particle(const Scene& scene, const ResolvedEffects& effects);
+
+}  // namespace breccia::sim

@@ -1,0 +1,58 @@
+// Wall time of the named stages of the step: what --profile prints and summary.json keeps.
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <string_view>
+#include <vector>
+
+namespace breccia::sim {
+
+class StageTimers {
+ public:
+  struct Stage {
+    std::string_view name;
+    double seconds = 0.0;
+    std::uint64_t calls = 0;
+  };
+
+  /// Runs `work` and books its time under `name` (a string literal).
+  template <class F>
+  decltype(auto) operator()(std::string_view name, F&& work) {
+    const Running running(stage(name));
+    return work();
+  }
+
+  [[nodiscard]] const std::vector<Stage>& stages() const { return stages_; }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  // Books the time when it goes out of scope, also on an exception.
+  class Running {
+   public:
+    explicit Running(Stage& stage) : stage_(stage), start_(Clock::now()) {}
+    ~Running() {
+      stage_.seconds += std::chrono::duration<double>(Clock::now() - start_).count();
+      ++stage_.calls;
+    }
+    Running(const Running&) = delete;
+    Running& operator=(const Running&) = delete;
+
+   private:
+    Stage& stage_;
+    Clock::time_point start_;
+  };
+
+  Stage& stage(std::string_view name) {
+    for (Stage& s : stages_) {
+      if (s.name == name) return s;
+    }
+    // Stages do not nest, so a reference is never held across this.
+    return stages_.emplace_back(Stage{name});
+  }
+
+  std::vector<Stage> stages_;
+};
+
+}  // namespace breccia::sim

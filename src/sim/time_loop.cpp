@@ -1,0 +1,101 @@
+#include "sim/time_loop.hpp"
+
+#include <algorithm>
+#include <cmath>
+
+#include "breccia/error.hpp"
+#include "sim/setup.hpp"
+
+namespace breccia::sim {
+
+TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm)
+    : scene_(scene),
+      viscosity_(effects.material.viscosity),
+      adaptive_(!scene.time.step),
+      comm_(comm),
+      engine_(make_loaded_engine(scene, effects, threads, comm)),
+      window_(scene.gravity.interval) {
+  const grid::SignalSpeeds speeds = engine_->signal_speeds();
+  dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
+  set_sort_interval(speeds.particle * dt_ / scene_.cell);
+  if (effects.gravity) {
+    solver_ = gravity::make_solver(effects.gravity_method, {scene.gravity.softening, scene.numerics.precision}, comm,
+                                   threads);
+    evaluate_gravity();
+  }
+  engine_->kick_velocities(0.5 * dt_);
+  timers_("stress, p2g", [&] { engine_->scatter(0.5 * dt_); });
+}
+
+void TimeLoop::run(const std::function<bool(const TimeLoop&)>& at_time_step) {
+  for (;;) {
+    // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
+    timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
+    if (!at_time_step(*this)) return;
+    one_step();
+  }
+}
+
+void TimeLoop::one_step() {
+  window_.advance();
+  if (window_.due() || sorting_due()) {
+    timers_("g2p", [&] { engine_->gather(dt_); });
+    book_pass();
+    between_steps();
+    timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
+  } else {
+    timers_("g2p, stress, p2g", [&] { engine_->gather_scatter(dt_); });
+    count_step();
+  }
+  book_pass();
+}
+
+void TimeLoop::count_step() {
+  previous_dt_ = dt_;
+  ++step_;
+  ++steps_since_sort_;
+  // A fixed step must not add up rounding over a million steps.
+  time_ = adaptive_ ? time_ + dt_ : static_cast<double>(step_) * dt_;
+}
+
+void TimeLoop::between_steps() {
+  count_step();
+  steps_since_sort_ = 0;
+  const double largest_move = comm_.max(engine_->last_pass().largest_move);
+  timers_("damage", [&] { engine_->finish_damage(); });
+  timers_("sort", [&] { engine_->sort(); });
+  if (window_.due()) begin_window();
+  set_sort_interval(largest_move * dt_ / previous_dt_);
+}
+
+void TimeLoop::begin_window() {
+  if (adaptive_) {
+    timers_("time step", [&] { dt_ = stable_step(scene_, engine_->signal_speeds(), viscosity_).seconds; });
+    if (!(dt_ > 0.0) || !std::isfinite(dt_)) throw NumericsError("the stable time step has become zero or not finite");
+  }
+  if (solver_) evaluate_gravity();
+}
+
+void TimeLoop::evaluate_gravity() {
+  timers_("gravity", [&] {
+    std::vector<Vec3d> position;
+    std::vector<double> mass;
+    engine_->predict(window_.prediction_time(dt_), position, mass);
+    std::vector<Vec3d> acceleration(position.size());
+    solver_->evaluate({position, mass}, acceleration, {});
+    engine_->hold_gravity(acceleration);
+  });
+}
+
+void TimeLoop::book_pass() {
+  lost_.plastic += engine_->last_pass().plastic_work;
+  lost_.viscous += engine_->last_pass().viscous_work;
+}
+
+void TimeLoop::set_sort_interval(double cells_per_step) {
+  // Particles may drift one cell between sortings; half of it is left for those that speed up meanwhile.
+  const double steps = cells_per_step > 0.0 ? 0.5 / cells_per_step : scene_.numerics.sort_interval;
+  sort_interval_ = std::clamp(static_cast<int>(std::min(steps, 1e6)), 1, scene_.numerics.sort_interval);
+}
+
+}  // namespace breccia::sim

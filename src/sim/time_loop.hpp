@@ -1,0 +1,61 @@
+// The time step as a script: grid, particles, and at the start of a window sorting, gravity and the choice of dt.
+#pragma once
+
+#include <functional>
+#include <memory>
+
+#include "gravity/solver.hpp"
+#include "gravity/window.hpp"
+#include "grid/engine.hpp"
+#include "sim/diagnostics.hpp"
+#include "sim/effects.hpp"
+#include "sim/stage_timers.hpp"
+#include "sim/step_size.hpp"
+
+namespace breccia::sim {
+
+class TimeLoop {
+ public:
+  /// Makes the engine with its particles, evaluates gravity, sets v^{-1/2} and scatters for the first time. Collective.
+  TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm);
+
+  /// Steps until `at_time_step` returns false; it is called at every t_n, when the grid holds v^{n-1/2} and v^{n+1/2}
+  /// and observe() is meaningful. Collective.
+  void run(const std::function<bool(const TimeLoop&)>& at_time_step);
+
+  [[nodiscard]] double time() const { return time_; }
+  [[nodiscard]] std::uint64_t step() const { return step_; }
+  [[nodiscard]] double dt() const { return dt_; }
+  [[nodiscard]] const grid::Engine& engine() const { return *engine_; }
+  [[nodiscard]] gravity::Solver* solver() const { return solver_.get(); }
+  [[nodiscard]] const LostWork& lost_work() const { return lost_; }
+  [[nodiscard]] StageTimers& timers() const { return timers_; }
+
+ private:
+  void one_step();
+  void count_step();
+  void between_steps();
+  void begin_window();
+  void evaluate_gravity();
+  void book_pass();
+  [[nodiscard]] bool sorting_due() const { return steps_since_sort_ + 1 >= sort_interval_; }
+  void set_sort_interval(double cells_per_step);
+
+  const Scene& scene_;
+  bool viscosity_;
+  bool adaptive_;
+  mpi::Comm comm_;
+  std::unique_ptr<grid::Engine> engine_;
+  std::unique_ptr<gravity::Solver> solver_;  // null: no self-gravity
+  gravity::Window window_;
+  LostWork lost_;
+  double time_ = 0.0;
+  double dt_ = 0.0;           // of the step that comes
+  double previous_dt_ = 0.0;  // of the step that was
+  std::uint64_t step_ = 0;
+  int sort_interval_ = 1;
+  int steps_since_sort_ = 0;
+  mutable StageTimers timers_;
+};
+
+}  // namespace breccia::sim

@@ -1,0 +1,62 @@
+// Direct summation as written in a textbook: one pair after the other, in double.
+#pragma once
+
+#include <cmath>
+#include <cstddef>
+#include <random>
+#include <vector>
+
+#include "breccia/constants.hpp"
+#include "breccia/linalg.hpp"
+
+namespace breccia::gravity {
+
+struct Cloud {
+  std::vector<Vec3d> position;
+  std::vector<double> mass;
+};
+
+struct Field {
+  std::vector<Vec3d> acceleration;
+  std::vector<double> potential;
+};
+
+inline Field plain_sum(const Cloud& cloud, double softening) {
+  const std::size_t n = cloud.position.size();
+  Field field{std::vector<Vec3d>(n), std::vector<double>(n)};
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::size_t j = 0; j < n; ++j) {
+      if (i == j) continue;
+      const Vec3d d = cloud.position[j] - cloud.position[i];
+      const double r = std::sqrt(dot(d, d) + softening * softening);
+      field.acceleration[i] += (kGravitationalConstant * cloud.mass[j] / (r * r * r)) * d;
+      field.potential[i] -= kGravitationalConstant * cloud.mass[j] / r;
+    }
+  }
+  return field;
+}
+
+/// sqrt(mean |a - b|^2 / mean |b|^2).
+inline double rms_error(const std::vector<Vec3d>& a, const std::vector<Vec3d>& b) {
+  double error = 0.0;
+  double size = 0.0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    error += dot(a[i] - b[i], a[i] - b[i]);
+    size += dot(b[i], b[i]);
+  }
+  return std::sqrt(error / size);
+}
+
+/// Adds `count` particles of 3e13 kg, 50 % up or down, uniform in a ball.
+inline void add_ball(Cloud& cloud, std::size_t count, Vec3d centre, double radius, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> unit(-1.0, 1.0);
+  while (count > 0) {
+    const Vec3d p{unit(random), unit(random), unit(random)};
+    if (dot(p, p) > 1.0) continue;
+    cloud.position.push_back(centre + radius * p);
+    cloud.mass.push_back(3e13 * (1.0 + 0.5 * unit(random)));
+    --count;
+  }
+}
+
+}  // namespace breccia::gravity

@@ -1,0 +1,12 @@
+# cmake -DCOMMAND=... -DFILE=... -P midway.cmake: COMMAND must end with exit code 4 and leave no FILE.
+file(TOUCH ${FILE})
+execute_process(COMMAND ${COMMAND} ${FILE} TIMEOUT 30 RESULT_VARIABLE code ERROR_VARIABLE text)
+if(NOT code EQUAL 4)
+  message(FATAL_ERROR "exit code ${code} instead of 4: ${text}")
+endif()
+if(NOT text MATCHES "error: ${FILE}: (/values: )?cannot (write|flush)")
+  message(FATAL_ERROR "the message does not name the file: ${text}")
+endif()
+if(EXISTS ${FILE})
+  message(FATAL_ERROR "a half file is left: ${FILE}")
+endif()
