@@ -8,7 +8,9 @@ target_compile_options(
             # Vectorisable square roots and selects; results stay IEEE.
             -fno-math-errno -fno-trapping-math
             # Vector types wider than the baseline's registers are passed between inlined functions only.
-            -Wno-psabi)
+            -Wno-psabi
+            # False alarm of g++ 12 on string concatenation (GCC bug 105329).
+            -Wno-restrict)
 if(BRECCIA_SANITIZE)
   target_compile_options(breccia_options INTERFACE -fsanitize=${BRECCIA_SANITIZE} -fno-omit-frame-pointer)
   target_link_options(breccia_options INTERFACE -fsanitize=${BRECCIA_SANITIZE})

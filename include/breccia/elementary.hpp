@@ -71,6 +71,30 @@ BRECCIA_HD T from_bits(const typename BitsOf<T>::type& bits) {
   return x;
 }
 
+/// a b + c, rounded once where the processor fuses them. Written out so that the compiler cannot choose differently for
+/// scalars and packs, which then give the same bits.
+BRECCIA_HD float multiply_add(float a, float b, float c) {
+#if defined(__FMA__) || defined(__CUDA_ARCH__)
+  return __builtin_fmaf(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
+BRECCIA_HD double multiply_add(double a, double b, double c) {
+#if defined(__FMA__) || defined(__CUDA_ARCH__)
+  return __builtin_fma(a, b, c);
+#else
+  return a * b + c;
+#endif
+}
+template <class S, int W>
+BRECCIA_HD Pack<S, W> multiply_add(Pack<S, W> a, Pack<S, W> b, Pack<S, W> c) {
+  // g++ merges this loop into vector instructions.
+  typename Pack<S, W>::Vector r;
+  for (int i = 0; i < W; ++i) r[i] = multiply_add(a.v[i], b.v[i], c.v[i]);
+  return r;
+}
+
 }  // namespace detail
 
 /// e^x to 1 ulp. x is clamped to [-87, 88] (float) or [-708, 709] (double), where the result is a normal number.
@@ -79,13 +103,13 @@ BRECCIA_HD T exp(T x) {
   using R = scalar_of<T>;
   using Format = detail::FloatFormat<R>;
   x = min(max(x, T(Format::kExpMin)), T(Format::kExpMax));
-  const T shifted = x * T(R(1.44269504088896340736)) + T(Format::kRound);
+  const T shifted = detail::multiply_add(x, T(R(1.44269504088896340736)), T(Format::kRound));
   const T k = shifted - T(Format::kRound);
-  const T r = (x - k * T(Format::kLn2High)) - k * T(Format::kLn2Low);
+  const T r = detail::multiply_add(k, T(-Format::kLn2Low), detail::multiply_add(k, T(-Format::kLn2High), x));
   // Taylor series of (e^r - 1 - r) / r^2 on |r| <= ln(2)/2, innermost term first: 1/2 (1 + r/3 (1 + r/4 (...))).
   T series(R(1));
-  for (int n = Format::kExpTerms; n >= 3; --n) series = series * (r * T(R(1) / R(n))) + T(R(1));
-  const T mantissa = T(R(1)) + (r * r * (T(R(0.5)) * series) + r);
+  for (int n = Format::kExpTerms; n >= 3; --n) series = detail::multiply_add(series, r * T(R(1) / R(n)), T(R(1)));
+  const T mantissa = T(R(1)) + detail::multiply_add(r * r, T(R(0.5)) * series, r);
   return detail::from_bits<T>(detail::to_bits(mantissa) + (detail::to_bits(shifted) << Format::kMantissaBits));
 }
 
@@ -104,10 +128,11 @@ BRECCIA_HD T log(T x) {
   const T s = f / (T(R(2)) + f);
   const T z = s * s;
   T series(R(2) / R(2 * Format::kLogTerms + 1));
-  for (int n = Format::kLogTerms - 1; n >= 1; --n) series = series * z + T(R(2) / R(2 * n + 1));
-  const T half_square = T(R(0.5)) * f * f;
-  const T correction = s * (half_square + z * series) + e * T(Format::kLn2Low);
-  return e * T(Format::kLn2High) + (f - (half_square - correction));
+  for (int n = Format::kLogTerms - 1; n >= 1; --n) series = detail::multiply_add(series, z, T(R(2) / R(2 * n + 1)));
+  const T half = T(R(0.5)) * f;
+  const T curvature = detail::multiply_add(z, series, half * f);
+  const T correction = detail::multiply_add(s, curvature, e * T(Format::kLn2Low));
+  return detail::multiply_add(e, T(Format::kLn2High), f - detail::multiply_add(half, f, -correction));
 }
 
 /// ln(1 + x) to 2 ulp for x > -1, also for tiny x.
@@ -125,7 +150,7 @@ BRECCIA_HD T cbrt(T x) {
   using R = scalar_of<T>;
   const T y = exp(log(x) * T(R(1) / R(3)));
   const T y2 = y * y;
-  const T newton = y - (y2 * y - x) / (T(R(3)) * y2);
+  const T newton = y - detail::multiply_add(y2, y, -x) / (T(R(3)) * y2);
   return select(x > T(R(0)), newton, T(R(0)));
 }
 

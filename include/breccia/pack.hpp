@@ -62,7 +62,8 @@ struct alignas(sizeof(S) * W) Pack {
 
   Pack() = default;
   BRECCIA_HD Pack(Vector x) : v(x) {}
-  BRECCIA_HD Pack(S s) : v(Vector{} + s) {}
+  // s - 0 is s for every s, -0 included: the compiler makes it a plain broadcast.
+  BRECCIA_HD Pack(S s) : v(s - Vector{}) {}
 
   BRECCIA_HD static Pack load(const S* p) {
     Pack r;

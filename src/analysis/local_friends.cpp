@@ -13,20 +13,12 @@ namespace {
 constexpr double kCellsPerLink = 1.7321;
 constexpr std::int64_t kReach = 2;
 
+// So few pairs are tried one by one.
+constexpr std::size_t kFewPairs = 64;
+
 struct CellIndex {
   std::int64_t x, y, z;
   auto operator<=>(const CellIndex&) const = default;
-};
-
-// Particles order[begin .. end) of one cell or of a part of it.
-struct Range {
-  std::size_t begin, end;
-  [[nodiscard]] std::size_t size() const { return end - begin; }
-};
-
-struct Cell {
-  CellIndex index;
-  Range members;
 };
 
 using Point = std::array<double, 3>;
@@ -38,6 +30,18 @@ struct Box {
     const std::size_t xy = extent(0) >= extent(1) ? 0 : 1;
     return extent(xy) >= extent(2) ? xy : 2;
   }
+};
+
+// Particles order[begin .. end) of one cell or of a part of it, and the box they fill.
+struct Cluster {
+  std::size_t begin, end;
+  Box box;
+  [[nodiscard]] std::size_t size() const { return end - begin; }
+};
+
+struct Cell {
+  CellIndex index;
+  Cluster members;
 };
 
 double nearest_squared(const Box& a, const Box& b) {
@@ -86,10 +90,10 @@ class Linker {
     }
     std::sort(keyed.begin(), keyed.end());
     order_.resize(n);
-    for (std::size_t k = 0; k < n; ++k) {
-      order_[k] = keyed[k].second;
-      if (cells_.empty() || cells_.back().index != keyed[k].first) cells_.push_back({keyed[k].first, {k, k}});
-      cells_.back().members.end = k + 1;
+    std::transform(keyed.begin(), keyed.end(), order_.begin(), [](const auto& entry) { return entry.second; });
+    for (std::size_t begin = 0, end = 0; begin < n; begin = end) {
+      while (end < n && keyed[end].first == keyed[begin].first) ++end;
+      cells_.push_back({keyed[begin].first, cluster(begin, end)});
     }
   }
 
@@ -120,15 +124,14 @@ class Linker {
 
   // Whether some particle of a is a friend of one of b. Boxes around the particles decide most cases; else the longer
   // box is halved, so that crowded cells are not compared particle by particle.
-  bool any_friends(Range a, Range b) {
-    const Box box_a = bounding_box(a);
-    const Box box_b = bounding_box(b);
-    if (nearest_squared(box_a, box_b) >= link_squared_) return false;
-    if (farthest_squared(box_a, box_b) < link_squared_) return true;
-    if (a.size() * b.size() <= 64) return any_pair(a, b);
-    const std::size_t axis_a = box_a.longest_axis();
-    const std::size_t axis_b = box_b.longest_axis();
-    if (box_a.extent(axis_a) < box_b.extent(axis_b)) {
+  bool any_friends(const Cluster& a, const Cluster& b) {
+    ++cost_.distances;
+    if (nearest_squared(a.box, b.box) >= link_squared_) return false;
+    if (farthest_squared(a.box, b.box) < link_squared_) return true;
+    if (a.size() * b.size() <= kFewPairs) return any_pair(a, b);
+    const std::size_t axis_a = a.box.longest_axis();
+    const std::size_t axis_b = b.box.longest_axis();
+    if (a.box.extent(axis_a) < b.box.extent(axis_b)) {
       const auto [low, high] = halve(b, axis_b);
       return any_friends(a, low) || any_friends(a, high);
     }
@@ -136,7 +139,7 @@ class Linker {
     return any_friends(low, b) || any_friends(high, b);
   }
 
-  bool any_pair(Range a, Range b) {
+  bool any_pair(const Cluster& a, const Cluster& b) {
     for (std::size_t k = a.begin; k < a.end; ++k) {
       for (std::size_t l = b.begin; l < b.end; ++l) {
         ++cost_.distances;
@@ -147,26 +150,27 @@ class Linker {
     return false;
   }
 
-  Box bounding_box(Range range) {
-    cost_.distances += range.size();
-    Box box{point(position_[order_[range.begin]]), point(position_[order_[range.begin]])};
-    for (std::size_t k = range.begin + 1; k < range.end; ++k) {
+  Cluster cluster(std::size_t begin, std::size_t end) {
+    cost_.distances += end - begin;
+    Box box{point(position_[order_[begin]]), point(position_[order_[begin]])};
+    for (std::size_t k = begin + 1; k < end; ++k) {
       const Point p = point(position_[order_[k]]);
       for (std::size_t axis = 0; axis < 3; ++axis) {
         box.low[axis] = std::min(box.low[axis], p[axis]);
         box.high[axis] = std::max(box.high[axis], p[axis]);
       }
     }
-    return box;
+    return {begin, end, box};
   }
 
-  std::pair<Range, Range> halve(Range range, std::size_t axis) {
-    const std::size_t middle = range.begin + range.size() / 2;
+  // At the median, so that the two halves are never empty.
+  std::pair<Cluster, Cluster> halve(const Cluster& whole, std::size_t axis) {
+    const std::size_t middle = whole.begin + whole.size() / 2;
     const auto at = [this](std::size_t k) { return order_.begin() + static_cast<std::ptrdiff_t>(k); };
-    std::nth_element(at(range.begin), at(middle), at(range.end), [&](std::size_t i, std::size_t j) {
+    std::nth_element(at(whole.begin), at(middle), at(whole.end), [&](std::size_t i, std::size_t j) {
       return point(position_[i])[axis] < point(position_[j])[axis];
     });
-    return {{range.begin, middle}, {middle, range.end}};
+    return {cluster(whole.begin, middle), cluster(middle, whole.end)};
   }
 
   std::span<const Vec3d> position_;

@@ -39,7 +39,7 @@ class UnionFind {
 /// Operations counted, so that tests can bound the work without a clock.
 struct FriendsCost {
   std::uint64_t cell_pairs = 0;  ///< neighbouring cells looked at
-  std::uint64_t distances = 0;   ///< distances between particles, and particles put into bounding boxes
+  std::uint64_t distances = 0;   ///< between particles or boxes, and particles put into boxes
 };
 
 /// The sets of particles connected by steps shorter than `link` [m].

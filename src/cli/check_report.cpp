@@ -40,7 +40,8 @@ void append_effects(Text& text, const std::vector<sim::EffectDecision>& effects)
 }
 
 std::string format_vector(Vec3d v, const char* unit) {
-  return fmt::format("({:.6g}, {:.6g}, {:.6g}) {}", v.x, v.y, v.z, unit);
+  // Adding zero prints -0 as 0.
+  return fmt::format("({:.6g}, {:.6g}, {:.6g}) {}", v.x + 0.0, v.y + 0.0, v.z + 0.0, unit);
 }
 
 void append_bodies(Text& text, const std::vector<BodyParameters>& bodies) {

@@ -66,8 +66,9 @@ void analyze(const Options& options, const mpi::Comm& comm) {
   const double target_mass = header.target_mass > 0.0 ? header.target_mass : heaviest_body(particles, comm);
   const std::vector<analysis::Remnant> remnants = analysis::find_remnants(particles, link, target_mass, comm);
   if (comm.is_root() && !is_standard_output(options.json)) print_remnants(remnants, header.time, link);
-  write_json({{"time", header.time}, {"link", link}, {"target_mass", target_mass}, {"remnants", io::to_json(remnants)}},
-             options.json, comm);
+  write_json(
+      {{"time", header.time}, {"link", link}, {"target_mass", target_mass}, {"remnants", io::remnants_json(remnants)}},
+      options.json, comm);
 }
 
 }  // namespace

@@ -49,17 +49,23 @@ BRECCIA_HD void load_tile(const Tile& tile, const typename P::Real* blocks, type
   });
 }
 
-/// Adds tile nodes to their blocks.
+/// Adds tile nodes to their blocks. Returns true if mass has reached a block that no particle of the tile could reach
+/// at the last sorting: a particle has drifted more than the margin allows.
 template <class P>
-BRECCIA_HD void add_tile(const Tile& tile, const typename P::Real* nodes, typename P::Real* blocks) {
+[[nodiscard]] BRECCIA_HD bool add_tile(const Tile& tile, const typename P::Real* nodes, typename P::Real* blocks) {
   using N = Node<P>;
+  bool lost = false;
   detail::for_each_run(tile, [&](std::uint32_t block, int in_block, int in_tile, int length) BRECCIA_INLINE_LAMBDA {
-    if (block == kNoBlock) return;
     const typename P::Real* from = nodes + in_tile * kChannels;
+    if (block == kNoBlock) {
+      for (int i = 0; i < length; ++i) lost = lost || from[i * kChannels + kMass] != typename P::Real(0);
+      return;
+    }
     typename P::Real* to = blocks + (std::size_t{block} * kBlockNodes + static_cast<std::size_t>(in_block)) * kChannels;
     for (int i = 0; i < length; ++i)
       (N::load(to + i * kChannels) + N::load(from + i * kChannels)).store(to + i * kChannels);
   });
+  return lost;
 }
 
 template <class P>

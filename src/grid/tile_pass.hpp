@@ -33,7 +33,7 @@ class TilePass {
       const int left = static_cast<int>(tile.particles) - p * kLanes;
       run_pack(tile.first_pack + static_cast<std::size_t>(p), left < kLanes ? left : kLanes, report);
     }
-    if (a_.scatter) add_tile<P>(tile, scratch_.sums, a_.sums);
+    if (a_.scatter && add_tile<P>(tile, scratch_.sums, a_.sums)) ++report.strayed;
   }
 
  private:

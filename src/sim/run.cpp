@@ -68,7 +68,7 @@ class Output {
 
   nlohmann::json remnants(const ParticleOutput& particles) const {
     const double link = scene_.output.link_cells * scene_.cell;
-    return io::to_json(analysis::find_remnants(particles, link, target_mass(scene_), comm_));
+    return io::remnants_json(analysis::find_remnants(particles, link, target_mass(scene_), comm_));
   }
   [[nodiscard]] const io::DiagnosticsRow& last_row() const { return last_row_; }
 

@@ -36,7 +36,7 @@ void add_body(ParticleArrays& all, Vec3d semi_axes, Vec3d centre, Vec3d velocity
   }
 }
 
-// This rank's share: every so manieth particle, so that all groups lie on all ranks.
+// This rank's share: dealt out one by one, so that all groups lie on all ranks.
 ParticleArrays share(const ParticleArrays& all) {
   const mpi::Comm comm;
   ParticleArrays mine;
@@ -67,7 +67,8 @@ TEST(Remnants, EllipsoidFarFromTheOriginIsMeasured) {
   EXPECT_EQ(r.label, 0U);
   EXPECT_EQ(r.particles, all.size());
   EXPECT_NEAR(r.mass_over_target, 1.5, 1e-12);
-  EXPECT_NEAR(r.position.x, centre.x, 1e-6);
+  // 3e4 terms of one sign, each sum rounded to 1.1e-16: at most 3e-12 of 3e7 m.
+  EXPECT_NEAR(r.position.x, centre.x, 1e-4);
   EXPECT_NEAR(r.velocity.z, velocity.z, 1e-9);
   // A lattice of 12 spacings along the smallest half axis: 1 % of ragged surface.
   EXPECT_NEAR(r.a, 150e3, 1.5e3);
@@ -79,7 +80,8 @@ TEST(Remnants, EllipsoidFarFromTheOriginIsMeasured) {
   EXPECT_NEAR(r.spin_period, 2.0 * kPi / std::sqrt(dot(spin, spin)), 1e-2);
   // Along one axis of a homogeneous ellipsoid the part beyond u half axes is (2 - 3u + u^3)/4: 1 % at u = 0.882.
   EXPECT_NEAR(r.trimmed_extent[0], 0.882 * r.a, 0.02 * r.a);
-  EXPECT_NEAR(r.trimmed_extent[2], 0.882 * r.c, kSpacing);
+  // Lattice layers quantise either end by up to one spacing.
+  EXPECT_NEAR(r.trimmed_extent[2], 0.882 * r.c, 2.0 * kSpacing);
   EXPECT_EQ(r.shape, ShapeClass::kElongated);
 }
 
@@ -132,7 +134,7 @@ TEST(Remnants, ClassesOfThePaper) {
   }
 }
 
-// Two spheres in contact: second moments of a pair of spheres give b/a = sqrt(2/7).
+// Two spheres in contact: second moments R^2/5 + R^2 along their line and R^2/5 across it give b/a = sqrt(1/6).
 TEST(Remnants, TouchingSpheresAreBilobed) {
   ParticleArrays all;
   add_body(all, {25e3, 25e3, 25e3}, {-25e3, 0, 0}, {}, {});

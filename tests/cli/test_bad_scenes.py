@@ -24,28 +24,28 @@ class BadScenes(CommandTest):
         self.assert_refused(SCENE.replace('end = "100 s"', "end = = 100"), "scene.toml:2")
 
     def test_unknown_key_names_the_nearest(self):
-        self.assert_refused(SCENE.replace("radius", "raduis", 1), "scene.toml:11", "raduis", "radius")
+        self.assert_refused(SCENE.replace("radius", "raduis", 1), "scene.toml:12", "raduis", "radius")
 
     def test_unknown_section_names_the_nearest(self):
         self.assert_refused(SCENE + "[gravty]\ninterval = 8\n", "gravty", "gravity")
 
     def test_wrong_unit(self):
-        self.assert_refused(SCENE.replace('"50 km"', '"50 s"'), "scene.toml:11", "body[0].radius", "length")
+        self.assert_refused(SCENE.replace('"50 km"', '"50 s"'), "scene.toml:12", "body[0].radius", "length")
 
     def test_missing_unit(self):
-        self.assert_refused(SCENE.replace('"50 km"', "50"), "scene.toml:11", "body[0].radius")
+        self.assert_refused(SCENE.replace('"50 km"', "50"), "scene.toml:12", "body[0].radius")
 
     def test_negative_radius(self):
-        self.assert_refused(SCENE.replace('"50 km"', '"-50 km"'), "scene.toml:11", "body[0].radius")
+        self.assert_refused(SCENE.replace('"50 km"', '"-50 km"'), "scene.toml:12", "body[0].radius")
 
     def test_overlapping_bodies(self):
         self.assert_refused(SCENE.replace('"100 km"', '"60 km"'), "target", "impactor", "overlap")
 
     def test_zero_particles(self):
-        self.assert_refused(SCENE.replace("particles = 300", "particles = 0"), "scene.toml:12", "body[0].particles")
+        self.assert_refused(SCENE.replace("particles = 300", "particles = 0"), "scene.toml:13", "body[0].particles")
 
     def test_wrong_type(self):
-        self.assert_refused(SCENE.replace("particles = 300", 'particles = "many"'), "scene.toml:12")
+        self.assert_refused(SCENE.replace("particles = 300", 'particles = "many"'), "scene.toml:13")
 
     def test_missing_required_key(self):
         self.assert_refused(SCENE.replace('cell = "10 km"\n', ""), "grid.cell")

@@ -13,7 +13,7 @@ class Run(CommandTest):
     def run_scene(self, *arguments, ranks=1):
         out = self.folder / f"out{ranks}"
         process = breccia("run", self.write_scene(), "--out", out, *arguments, ranks=ranks)
-        self.assertEqual((process.returncode, process.stderr), (0, ""))
+        self.assertEqual(process.returncode, 0, process.stderr)
         return out, json.loads((out / "summary.json").read_text())
 
     def test_files_and_summary(self):
