@@ -50,7 +50,7 @@ double heaviest_body(const ParticleArrays& particles, const mpi::Comm& comm) {
 }
 
 void print_remnants(const std::vector<analysis::Remnant>& remnants, double time, double link) {
-  fmt::print("t = {:.6g} s, particles within {:.6g} m linked: {} remnants\n", time, link, remnants.size());
+  fmt::print("t = {:.6g} s, particles within {:.6g} m linked; remnants: {}\n", time, link, remnants.size());
   fmt::print("{:>9} {:>12} {:>11} {:>8} {:>6} {:>6} {:>9}  {}\n", "particles", "mass/kg", "mass/target", "a/km", "b/a",
              "c/a", "period/h", "class");
   for (const analysis::Remnant& r : remnants) {

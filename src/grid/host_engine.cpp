@@ -89,9 +89,11 @@ template <class P>
 void HostEngine<P>::run_pass(const PassArguments<P>& arguments) {
   std::vector<TileReport> reports(tiles_.size());
 #pragma omp parallel num_threads(setup_.threads)
-  for (const std::vector<std::uint32_t>& colour : tiles_of_colour_) {
-#pragma omp for schedule(static)
-    for (std::size_t n = 0; n < colour.size(); ++n) kernels_.pass(arguments, colour[n], reports[colour[n]]);
+  for (const std::vector<TilePlane>& planes : planes_of_colour_) {
+#pragma omp for schedule(dynamic, 1)
+    for (std::size_t n = 0; n < planes.size(); ++n) {
+      for (std::uint32_t t = planes[n].first; t < planes[n].last; ++t) kernels_.pass(arguments, t, reports[t]);
+    }
   }
   report_ = {};
   for (const TileReport& r : reports) {

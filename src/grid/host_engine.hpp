@@ -1,5 +1,5 @@
-// The engine on host cores: threads over tiles, one colour of tiles after the other so that no node is written twice at
-// once and sums are repeatable for any number of threads.
+// The engine on host cores: threads over planes of tiles, even planes before odd ones, so that no node is written twice
+// at once and sums are the same for any number of threads.
 #pragma once
 
 #include "grid/blocks.hpp"
@@ -15,6 +15,11 @@ namespace breccia::grid {
 struct Placement {
   std::uint32_t slot;
   std::int32_t node[3];
+};
+
+/// Consecutive tiles whose blocks lie in one plane normal to x.
+struct TilePlane {
+  std::uint32_t first, last;
 };
 
 template <class P>
@@ -57,7 +62,7 @@ class HostEngine final : public Engine {
   void arrange(std::span<const Placement> placements);
   void connect_tiles();
   void connect_halo();
-  void colour_tiles();
+  void colour_planes();
   void compact_flaws();
   [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
 
@@ -85,7 +90,7 @@ class HostEngine final : public Engine {
   ParticleStore<P> store_;
   std::vector<float> flaw_thresholds_;
   std::vector<Tile> tiles_;
-  std::vector<std::vector<std::uint32_t>> tiles_of_colour_;
+  std::vector<std::vector<TilePlane>> planes_of_colour_;
   BlockTable blocks_;
   std::vector<Real> sums_;
   std::vector<Real> velocities_;

@@ -118,19 +118,20 @@ void HostEngine<P>::connect_halo() {
 }
 
 template <class P>
-void HostEngine<P>::colour_tiles() {
-  // Tiles two blocks apart share no node. On a periodic axis with an odd number of blocks the last one gets a colour
-  // of its own, since it is next to the first.
-  const auto colour = [&](std::int32_t b, int axis) {
-    const std::int32_t n = periodicity_.blocks[static_cast<std::size_t>(axis)];
-    return n % 2 == 1 && b == n - 1 ? 2 : b & 1;
-  };
-  tiles_of_colour_.assign(27, {});
-  for (std::uint32_t t = 0; t < tiles_.size(); ++t) {
-    const BlockCoord b = block_coord(blocks_.keys()[t]);
-    tiles_of_colour_[static_cast<std::size_t>((colour(b.x, 0) * 3 + colour(b.y, 1)) * 3 + colour(b.z, 2))].push_back(t);
+void HostEngine<P>::colour_planes() {
+  // Tiles are sorted by x first, so a plane of blocks is a run of tiles, and inside it consecutive tiles share most of
+  // their nodes while these are warm. Planes two apart share no node. On a periodic axis with an odd number of blocks
+  // the last plane gets a colour of its own, since it is next to the first.
+  const std::int32_t period = periodicity_.blocks[0];
+  planes_of_colour_.assign(3, {});
+  for (std::uint32_t first = 0; first < tiles_.size();) {
+    const std::int32_t x = block_coord(blocks_.keys()[first]).x;
+    std::uint32_t last = first + 1;
+    while (last < tiles_.size() && block_coord(blocks_.keys()[last]).x == x) ++last;
+    const bool odd_one_out = period % 2 == 1 && x == period - 1;
+    planes_of_colour_[odd_one_out ? 2U : static_cast<std::uint32_t>(x & 1)].push_back({first, last});
+    first = last;
   }
-  std::erase_if(tiles_of_colour_, [](const auto& tiles) { return tiles.empty(); });
 }
 
 template class HostEngine<MixedPrecision>;

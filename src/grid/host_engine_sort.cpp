@@ -77,7 +77,7 @@ void HostEngine<P>::settle(std::vector<Placement> placements) {
   arrange(placements);
   connect_tiles();
   connect_halo();
-  colour_tiles();
+  colour_planes();
 }
 
 template <class P>

@@ -7,24 +7,25 @@ namespace breccia::grid {
 
 namespace detail {
 
-// Calls run(block, first node in the block, first node in the tile, nodes) for the runs along z that make up a tile.
+// The stretches of nodes along an axis that a tile shares with the blocks below, at and above its own.
+inline constexpr int kLength[3] = {kTileMargin, kBlockWidth, kTileMargin};
+inline constexpr int kBlockStart[3] = {kBlockWidth - kTileMargin, 0, 0};
+inline constexpr int kTileStart[3] = {0, kTileMargin, kTileMargin + kBlockWidth};
+
+// Calls run.operator()<nodes>(block, first node in the block, first node in the tile) for the runs along z of a tile.
+// Lengths are compile-time constants: copies of two and four nodes without branches overlap their cache misses.
 template <class F>
 BRECCIA_HD void for_each_run(const Tile& tile, F&& run) {
-  constexpr int from_lower = kBlockWidth - kTileMargin;  // block-local node where the lower margin starts
-  constexpr int length[3] = {kTileMargin, kBlockWidth, kTileMargin};
-  constexpr int block_start[3] = {from_lower, 0, 0};
-  constexpr int tile_start[3] = {0, kTileMargin, kTileMargin + kBlockWidth};
   for (int bx = 0; bx < 3; ++bx) {
     for (int by = 0; by < 3; ++by) {
-      for (int bz = 0; bz < 3; ++bz) {
-        const std::uint32_t block = tile.neighbours[(bx * 3 + by) * 3 + bz];
-        for (int x = 0; x < length[bx]; ++x) {
-          for (int y = 0; y < length[by]; ++y) {
-            const int in_block =
-                ((block_start[bx] + x) * kBlockWidth + block_start[by] + y) * kBlockWidth + block_start[bz];
-            const int in_tile = ((tile_start[bx] + x) * kTileWidth + tile_start[by] + y) * kTileWidth + tile_start[bz];
-            run(block, in_block, in_tile, length[bz]);
-          }
+      const std::uint32_t* blocks = tile.neighbours + (bx * 3 + by) * 3;
+      for (int x = 0; x < kLength[bx]; ++x) {
+        for (int y = 0; y < kLength[by]; ++y) {
+          const int in_block = ((kBlockStart[bx] + x) * kBlockWidth + kBlockStart[by] + y) * kBlockWidth;
+          const int in_tile = ((kTileStart[bx] + x) * kTileWidth + kTileStart[by] + y) * kTileWidth;
+          run.template operator()<kLength[0]>(blocks[0], in_block + kBlockStart[0], in_tile + kTileStart[0]);
+          run.template operator()<kLength[1]>(blocks[1], in_block + kBlockStart[1], in_tile + kTileStart[1]);
+          run.template operator()<kLength[2]>(blocks[2], in_block + kBlockStart[2], in_tile + kTileStart[2]);
         }
       }
     }
@@ -37,15 +38,15 @@ BRECCIA_HD void for_each_run(const Tile& tile, F&& run) {
 template <class P>
 BRECCIA_HD void load_tile(const Tile& tile, const typename P::Real* blocks, typename P::Real* nodes) {
   using N = Node<P>;
-  detail::for_each_run(tile, [&](std::uint32_t block, int in_block, int in_tile, int length) BRECCIA_INLINE_LAMBDA {
+  detail::for_each_run(tile, [&]<int kNodes>(std::uint32_t block, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
     typename P::Real* to = nodes + in_tile * kChannels;
     if (block == kNoBlock) {
-      for (int i = 0; i < length; ++i) N{}.store(to + i * kChannels);
+      for (int i = 0; i < kNodes; ++i) N{}.store(to + i * kChannels);
       return;
     }
     const typename P::Real* from =
         blocks + (std::size_t{block} * kBlockNodes + static_cast<std::size_t>(in_block)) * kChannels;
-    for (int i = 0; i < length; ++i) N::load(from + i * kChannels).store(to + i * kChannels);
+    for (int i = 0; i < kNodes; ++i) N::load(from + i * kChannels).store(to + i * kChannels);
   });
 }
 
@@ -55,14 +56,14 @@ template <class P>
 [[nodiscard]] BRECCIA_HD bool add_tile(const Tile& tile, const typename P::Real* nodes, typename P::Real* blocks) {
   using N = Node<P>;
   bool lost = false;
-  detail::for_each_run(tile, [&](std::uint32_t block, int in_block, int in_tile, int length) BRECCIA_INLINE_LAMBDA {
+  detail::for_each_run(tile, [&]<int kNodes>(std::uint32_t block, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
     const typename P::Real* from = nodes + in_tile * kChannels;
     if (block == kNoBlock) {
-      for (int i = 0; i < length; ++i) lost = lost || from[i * kChannels + kMass] != typename P::Real(0);
+      for (int i = 0; i < kNodes; ++i) lost = lost || from[i * kChannels + kMass] != typename P::Real(0);
       return;
     }
     typename P::Real* to = blocks + (std::size_t{block} * kBlockNodes + static_cast<std::size_t>(in_block)) * kChannels;
-    for (int i = 0; i < length; ++i)
+    for (int i = 0; i < kNodes; ++i)
       (N::load(to + i * kChannels) + N::load(from + i * kChannels)).store(to + i * kChannels);
   });
   return lost;

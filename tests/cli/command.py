@@ -33,7 +33,7 @@ shape = "sphere"
 radius = "30 km"
 particles = 100
 damage = 1
-position = ["100 km", "0 km", "0 km"]
+position = ["140 km", "0 km", "0 km"]
 velocity = ["-200 m/s", "0 m/s", "0 m/s"]
 """
 
@@ -43,9 +43,15 @@ def run_program(command, ranks=1, cwd=None):
     if ranks > 1:
         command = [MPIRUN, "-n", str(ranks), *command]
     environment = dict(os.environ, OMPI_MCA_orte_execute_quiet="1")
-    return subprocess.run(
-        command, cwd=cwd, env=environment, stdin=subprocess.DEVNULL, capture_output=True, text=True, timeout=TIMEOUT
-    )
+    with subprocess.Popen(
+        command, cwd=cwd, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as process:
+        try:
+            output, errors = process.communicate(timeout=TIMEOUT)
+        except subprocess.TimeoutExpired:
+            process.terminate()  # mpirun passes this on to its ranks; killed, it would leave them behind
+            raise
+    return subprocess.CompletedProcess(command, process.returncode, output, errors)
 
 
 def breccia(*arguments, ranks=1, cwd=None):

@@ -39,7 +39,7 @@ class BadScenes(CommandTest):
         self.assert_refused(SCENE.replace('"50 km"', '"-50 km"'), "scene.toml:12", "body[0].radius")
 
     def test_overlapping_bodies(self):
-        self.assert_refused(SCENE.replace('"100 km"', '"60 km"'), "target", "impactor", "overlap")
+        self.assert_refused(SCENE.replace('"140 km"', '"60 km"'), "target", "impactor", "overlap")
 
     def test_zero_particles(self):
         self.assert_refused(SCENE.replace("particles = 300", "particles = 0"), "scene.toml:13", "body[0].particles")

@@ -19,7 +19,7 @@ class Check(CommandTest):
             self.assertEqual((target["name"], target["particles"]), ("target", 300))
             # Basalt of 2700 kg/m3; the mass of a sphere is exact whatever its particles are.
             self.assertAlmostEqual(target["mass"] / (2700 * 4 / 3 * pi * 50e3**3), 1, delta=1e-12)
-            self.assertEqual(impactor["position"], [100e3, 0, 0])
+            self.assertEqual(impactor["position"], [140e3, 0, 0])
             self.assertEqual(impactor["velocity"], [-200, 0, 0])
             self.assertEqual(impactor["spin"], [0, 0, 0])
 

@@ -28,9 +28,10 @@ class Run(CommandTest):
                 self.assertAlmostEqual(summary["simulated_time"], 10.0, delta=1e-9)
                 # The particles carry the mass: none may be lost.
                 self.assertEqual(summary["conservation"]["mass"], 0.0)
-                # 20 km apart and closing at 200 m/s: two bodies after 10 s, each whole.
+                # 60 km apart and closing at 200 m/s: two bodies after 10 s, each whole.
                 self.assertEqual(len(summary["remnants"]), 2)
-                self.assertAlmostEqual(summary["remnants"][0]["mass_over_target"], 1.0, delta=1e-9)
+                # Mixed precision stores the mass of a particle as a float: 2^-24 of it may be off.
+                self.assertAlmostEqual(summary["remnants"][0]["mass_over_target"], 1.0, delta=6e-8)
                 self.assertEqual(summary["scene"]["grid.cell"], "10 km")
 
     def test_steps_and_override(self):
@@ -41,8 +42,8 @@ class Run(CommandTest):
     def test_diagnostics_begin_and_end(self):
         out, _ = self.run_scene("--steps", 5)
         with open(out / "diagnostics.csv") as file:
-            rows = list(csv.DictReader(line for line in file if not line.startswith("#")))
-        self.assertEqual([row["step"] for row in (rows[0], rows[-1])], ["0", "5"])
+            rows = list(csv.DictReader(file))
+        self.assertEqual([row["step [1]"] for row in (rows[0], rows[-1])], ["0", "5"])
 
     def test_profile_lists_stages(self):
         process = breccia("run", self.write_scene(), "--out", self.folder / "out", "--steps", 2, "--profile")
