@@ -35,8 +35,9 @@ BRECCIA_HD V difference(const PointArrays<typename V::Scalar>& sources, int axis
 // True in the lane whose target is the source itself: lane == j - i.
 template <class V>
 BRECCIA_HD typename V::Mask is_self(std::int64_t offset) {
-  using Int = typename V::MaskInt;
-  typename V::Mask::Vector lanes{};
+  using Lanes = typename V::Mask::Vector;
+  using Int = std::remove_cvref_t<decltype(Lanes{}[0])>;
+  Lanes lanes{};
   for (int l = 0; l < V::kLanes; ++l) lanes[l] = static_cast<Int>(l);
   return {lanes == static_cast<Int>(offset)};
 }

@@ -48,14 +48,14 @@ struct FloatFormat<double> {
   static constexpr int kExpTerms = 13, kLogTerms = 10;
 };
 
-/// Unsigned integers (or a vector of them) with the bits of T.
+/// Unsigned integers (or a pack of them) with the bits of T.
 template <class T>
 struct BitsOf {
   using type = typename FloatFormat<T>::Bits;
 };
 template <class S, int W>
 struct BitsOf<Pack<S, W>> {
-  using type = typename VectorOf<typename FloatFormat<S>::Bits, W>::type;
+  using type = Pack<typename FloatFormat<S>::Bits, W>;
 };
 
 template <class T>
@@ -89,10 +89,14 @@ BRECCIA_HD double multiply_add(double a, double b, double c) {
 }
 template <class S, int W>
 BRECCIA_HD Pack<S, W> multiply_add(Pack<S, W> a, Pack<S, W> b, Pack<S, W> c) {
-  // g++ merges this loop into vector instructions.
-  typename Pack<S, W>::Vector r;
-  for (int i = 0; i < W; ++i) r[i] = multiply_add(a.v[i], b.v[i], c.v[i]);
-  return r;
+  if constexpr (kIsWide<S, W>) {
+    return {multiply_add(a.low, b.low, c.low), multiply_add(a.high, b.high, c.high)};
+  } else {
+    // g++ merges this loop into vector instructions.
+    typename Pack<S, W>::Vector r;
+    for (int i = 0; i < W; ++i) r[i] = multiply_add(a.v[i], b.v[i], c.v[i]);
+    return r;
+  }
 }
 
 }  // namespace detail

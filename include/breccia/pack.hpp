@@ -1,14 +1,25 @@
 // SIMD packs: W lanes of a scalar S with the operators of a number, so that one physics source serves scalars, packs
-// and CUDA threads. Host only (g++ and clang vector extensions); the layout is the same on every instruction set.
+// and CUDA threads. Host only (g++ and clang vector extensions). Packs wider than a register are made of two halves;
+// the layout in memory is the same on every instruction set.
 #pragma once
 
 #include <cmath>
 #include <cstdint>
 #include <cstring>
+#include <type_traits>
+#include <utility>
 
 #include "breccia/macros.hpp"
 
 namespace breccia {
+
+#if defined(__AVX512F__)
+inline constexpr int kRegisterBytes = 64;
+#elif defined(__AVX2__)
+inline constexpr int kRegisterBytes = 32;
+#else
+inline constexpr int kRegisterBytes = 16;
+#endif
 
 namespace detail {
 // The attribute is silently lost on a dependent typedef inside a class, hence this helper.
@@ -17,28 +28,18 @@ struct VectorOf {
   static constexpr int kBytes = static_cast<int>(sizeof(S)) * W;
   using type [[gnu::vector_size(kBytes)]] = S;
 };
-template <class S>
-struct IntOfSize;
+template <std::size_t kBytes>
+struct SignedOf;
 template <>
-struct IntOfSize<float> {
+struct SignedOf<4> {
   using type = std::int32_t;
 };
 template <>
-struct IntOfSize<double> {
+struct SignedOf<8> {
   using type = std::int64_t;
 };
-template <>
-struct IntOfSize<std::int32_t> {
-  using type = std::int32_t;
-};
-template <>
-struct IntOfSize<std::int64_t> {
-  using type = std::int64_t;
-};
-template <>
-struct IntOfSize<std::uint32_t> {
-  using type = std::int32_t;
-};
+template <class S, int W>
+inline constexpr bool kIsWide = static_cast<int>(sizeof(S)) * W > kRegisterBytes;
 }  // namespace detail
 
 /// Lane mask of a pack: all bits set where true.
@@ -47,6 +48,11 @@ struct PackMask {
   using Vector = typename detail::VectorOf<I, W>::type;
   Vector v;
 };
+template <class I, int W>
+requires detail::kIsWide<I, W>
+struct PackMask<I, W> {
+  PackMask<I, W / 2> low, high;
+};
 
 /// W lanes of S. Arithmetic is lane-wise; a scalar operand is broadcast. The alignment is stated because that of a wide
 /// vector depends on the instruction set, and packs in memory are shared by all copies of the kernels.
@@ -54,8 +60,7 @@ template <class S, int W>
 struct alignas(sizeof(S) * W) Pack {
   using Scalar = S;
   using Vector = typename detail::VectorOf<S, W>::type;
-  using MaskInt = typename detail::IntOfSize<S>::type;
-  using Mask = PackMask<MaskInt, W>;
+  using Mask = PackMask<typename detail::SignedOf<sizeof(S)>::type, W>;
   static constexpr int kLanes = W;
 
   Vector v;
@@ -79,79 +84,212 @@ struct alignas(sizeof(S) * W) Pack {
   friend BRECCIA_HD Pack operator*(Pack a, Pack b) { return a.v * b.v; }
   friend BRECCIA_HD Pack operator/(Pack a, Pack b) { return a.v / b.v; }
   friend BRECCIA_HD Pack operator-(Pack a) { return -a.v; }
-  BRECCIA_HD Pack& operator+=(Pack b) { return *this = *this + b; }
-  BRECCIA_HD Pack& operator-=(Pack b) { return *this = *this - b; }
-  BRECCIA_HD Pack& operator*=(Pack b) { return *this = *this * b; }
   friend BRECCIA_HD Mask operator<(Pack a, Pack b) { return {a.v < b.v}; }
   friend BRECCIA_HD Mask operator<=(Pack a, Pack b) { return {a.v <= b.v}; }
   friend BRECCIA_HD Mask operator>(Pack a, Pack b) { return {a.v > b.v}; }
   friend BRECCIA_HD Mask operator>=(Pack a, Pack b) { return {a.v >= b.v}; }
   friend BRECCIA_HD Mask operator==(Pack a, Pack b) { return {a.v == b.v}; }
+
+  // Bits, for integer lanes only.
+  friend BRECCIA_HD Pack operator&(Pack a, Pack b) { return a.v & b.v; }
+  friend BRECCIA_HD Pack operator|(Pack a, Pack b) { return a.v | b.v; }
+  friend BRECCIA_HD Pack operator^(Pack a, Pack b) { return a.v ^ b.v; }
+  friend BRECCIA_HD Pack operator>>(Pack a, int bits) { return a.v >> bits; }
+  friend BRECCIA_HD Pack operator<<(Pack a, int bits) { return a.v << bits; }
 };
+
+template <class S, int W>
+requires detail::kIsWide<S, W>
+struct alignas(sizeof(S) * W) Pack<S, W> {
+  using Scalar = S;
+  using Half = Pack<S, W / 2>;
+  using Mask = PackMask<typename detail::SignedOf<sizeof(S)>::type, W>;
+  static constexpr int kLanes = W;
+
+  Half low, high;
+
+  Pack() = default;
+  BRECCIA_HD Pack(Half l, Half h) : low(l), high(h) {}
+  BRECCIA_HD Pack(S s) : low(s), high(s) {}
+
+  BRECCIA_HD static Pack load(const S* p) { return {Half::load(p), Half::load(p + W / 2)}; }
+  BRECCIA_HD void store(S* p) const {
+    low.store(p);
+    high.store(p + W / 2);
+  }
+  BRECCIA_HD S operator[](int lane) const { return lane < W / 2 ? low[lane] : high[lane - W / 2]; }
+  BRECCIA_HD void set(int lane, S s) { lane < W / 2 ? low.set(lane, s) : high.set(lane - W / 2, s); }
+
+  friend BRECCIA_HD Pack operator+(Pack a, Pack b) { return {a.low + b.low, a.high + b.high}; }
+  friend BRECCIA_HD Pack operator-(Pack a, Pack b) { return {a.low - b.low, a.high - b.high}; }
+  friend BRECCIA_HD Pack operator*(Pack a, Pack b) { return {a.low * b.low, a.high * b.high}; }
+  friend BRECCIA_HD Pack operator/(Pack a, Pack b) { return {a.low / b.low, a.high / b.high}; }
+  friend BRECCIA_HD Pack operator-(Pack a) { return {-a.low, -a.high}; }
+  friend BRECCIA_HD Mask operator<(Pack a, Pack b) { return {a.low < b.low, a.high < b.high}; }
+  friend BRECCIA_HD Mask operator<=(Pack a, Pack b) { return {a.low <= b.low, a.high <= b.high}; }
+  friend BRECCIA_HD Mask operator>(Pack a, Pack b) { return {a.low > b.low, a.high > b.high}; }
+  friend BRECCIA_HD Mask operator>=(Pack a, Pack b) { return {a.low >= b.low, a.high >= b.high}; }
+  friend BRECCIA_HD Mask operator==(Pack a, Pack b) { return {a.low == b.low, a.high == b.high}; }
+  friend BRECCIA_HD Pack operator&(Pack a, Pack b) { return {a.low & b.low, a.high & b.high}; }
+  friend BRECCIA_HD Pack operator|(Pack a, Pack b) { return {a.low | b.low, a.high | b.high}; }
+  friend BRECCIA_HD Pack operator^(Pack a, Pack b) { return {a.low ^ b.low, a.high ^ b.high}; }
+  friend BRECCIA_HD Pack operator>>(Pack a, int bits) { return {a.low >> bits, a.high >> bits}; }
+  friend BRECCIA_HD Pack operator<<(Pack a, int bits) { return {a.low << bits, a.high << bits}; }
+};
+
+template <class S, int W>
+BRECCIA_HD Pack<S, W>& operator+=(Pack<S, W>& a, std::type_identity_t<Pack<S, W>> b) {
+  return a = a + b;
+}
+template <class S, int W>
+BRECCIA_HD Pack<S, W>& operator-=(Pack<S, W>& a, std::type_identity_t<Pack<S, W>> b) {
+  return a = a - b;
+}
+template <class S, int W>
+BRECCIA_HD Pack<S, W>& operator*=(Pack<S, W>& a, std::type_identity_t<Pack<S, W>> b) {
+  return a = a * b;
+}
+
+namespace detail {
+template <std::size_t kFirst, class S, int W, std::size_t... kLane>
+BRECCIA_HD Pack<S, W / 2> lanes_from(Pack<S, W> a, std::index_sequence<kLane...>) {
+  return Pack<S, W / 2>(__builtin_shufflevector(a.v, a.v, (kFirst + kLane)...));
+}
+template <class S, int W, std::size_t... kLane>
+BRECCIA_HD Pack<S, 2 * W> concatenated(Pack<S, W> a, Pack<S, W> b, std::index_sequence<kLane...>) {
+  return Pack<S, 2 * W>(__builtin_shufflevector(a.v, b.v, kLane...));
+}
+}  // namespace detail
+
+/// First and second half of the lanes.
+template <class S, int W>
+BRECCIA_HD Pack<S, W / 2> lower(Pack<S, W> a) {
+  if constexpr (detail::kIsWide<S, W>) {
+    return a.low;
+  } else {
+    return detail::lanes_from<0>(a, std::make_index_sequence<W / 2>());
+  }
+}
+template <class S, int W>
+BRECCIA_HD Pack<S, W / 2> upper(Pack<S, W> a) {
+  if constexpr (detail::kIsWide<S, W>) {
+    return a.high;
+  } else {
+    return detail::lanes_from<W / 2>(a, std::make_index_sequence<W / 2>());
+  }
+}
+/// The lanes of a, then those of b.
+template <class S, int W>
+BRECCIA_HD Pack<S, 2 * W> join(Pack<S, W> a, Pack<S, W> b) {
+  if constexpr (detail::kIsWide<S, 2 * W>) {
+    return {a, b};
+  } else {
+    return detail::concatenated(a, b, std::make_index_sequence<2 * W>());
+  }
+}
 
 template <class I, int W>
 BRECCIA_HD PackMask<I, W> operator&(PackMask<I, W> a, PackMask<I, W> b) {
-  return {a.v & b.v};
+  if constexpr (detail::kIsWide<I, W>) {
+    return {a.low & b.low, a.high & b.high};
+  } else {
+    return {a.v & b.v};
+  }
 }
 template <class I, int W>
 BRECCIA_HD PackMask<I, W> operator|(PackMask<I, W> a, PackMask<I, W> b) {
-  return {a.v | b.v};
+  if constexpr (detail::kIsWide<I, W>) {
+    return {a.low | b.low, a.high | b.high};
+  } else {
+    return {a.v | b.v};
+  }
 }
 template <class I, int W>
 BRECCIA_HD PackMask<I, W> operator!(PackMask<I, W> a) {
-  return {~a.v};
+  if constexpr (detail::kIsWide<I, W>) {
+    return {!a.low, !a.high};
+  } else {
+    return {~a.v};
+  }
 }
 /// True where any lane is set.
 template <class I, int W>
 BRECCIA_HD bool any(PackMask<I, W> m) {
-  I r = 0;
-  for (int i = 0; i < W; ++i) r |= m.v[i];
-  return r != 0;
-}
-template <class I, int W>
-BRECCIA_HD bool lane(PackMask<I, W> m, int i) {
-  return m.v[i] != 0;
+  if constexpr (detail::kIsWide<I, W>) {
+    return any(m.low | m.high);
+  } else {
+    I r = 0;
+    for (int i = 0; i < W; ++i) r |= m.v[i];
+    return r != 0;
+  }
 }
 
 template <class S, int W>
 BRECCIA_HD Pack<S, W> select(typename Pack<S, W>::Mask m, Pack<S, W> a, Pack<S, W> b) {
-  return Pack<S, W>(m.v ? a.v : b.v);
+  if constexpr (detail::kIsWide<S, W>) {
+    return {select(m.low, a.low, b.low), select(m.high, a.high, b.high)};
+  } else {
+    return Pack<S, W>(m.v ? a.v : b.v);
+  }
 }
 template <class S, int W>
 BRECCIA_HD Pack<S, W> min(Pack<S, W> a, Pack<S, W> b) {
-  return Pack<S, W>(a.v < b.v ? a.v : b.v);
+  return select(a < b, a, b);
 }
 template <class S, int W>
 BRECCIA_HD Pack<S, W> max(Pack<S, W> a, Pack<S, W> b) {
-  return Pack<S, W>(a.v > b.v ? a.v : b.v);
+  return select(a > b, a, b);
 }
 template <class S, int W>
 BRECCIA_HD Pack<S, W> abs(Pack<S, W> a) {
-  return Pack<S, W>(a.v < S(0) ? -a.v : a.v);
+  return select(a < Pack<S, W>(S(0)), -a, a);
 }
 template <class S, int W>
 BRECCIA_HD Pack<S, W> sqrt(Pack<S, W> a) {
-  // g++ merges this loop into one vector square root (with -fno-math-errno).
-  typename Pack<S, W>::Vector r;
-  for (int i = 0; i < W; ++i) r[i] = std::sqrt(a.v[i]);
-  return r;
+  if constexpr (detail::kIsWide<S, W>) {
+    return {sqrt(a.low), sqrt(a.high)};
+  } else {
+    // g++ merges this loop into one vector square root (with -fno-math-errno).
+    typename Pack<S, W>::Vector r;
+    for (int i = 0; i < W; ++i) r[i] = std::sqrt(a.v[i]);
+    return r;
+  }
 }
+/// Halving sums: a tree of depth log2(W) instead of a chain of W additions.
 template <class S, int W>
 BRECCIA_HD S horizontal_sum(Pack<S, W> a) {
-  S r = 0;
-  for (int i = 0; i < W; ++i) r += a.v[i];
-  return r;
+  if constexpr (W == 1) {
+    return a[0];
+  } else {
+    return horizontal_sum(lower(a) + upper(a));
+  }
 }
 template <class S, int W>
 BRECCIA_HD S horizontal_max(Pack<S, W> a) {
-  S r = a.v[0];
-  for (int i = 1; i < W; ++i) r = a.v[i] > r ? a.v[i] : r;
-  return r;
+  if constexpr (W == 1) {
+    return a[0];
+  } else {
+    return horizontal_max(max(lower(a), upper(a)));
+  }
 }
 /// Lane-wise conversion between scalar types of the same lane count.
 template <class To, class S, int W>
 BRECCIA_HD Pack<To, W> convert(Pack<S, W> a) {
-  return __builtin_convertvector(a.v, typename Pack<To, W>::Vector);
+  if constexpr (detail::kIsWide<S, W> || detail::kIsWide<To, W>) {
+    return join(convert<To>(lower(a)), convert<To>(upper(a)));
+  } else {
+    return Pack<To, W>(__builtin_convertvector(a.v, typename Pack<To, W>::Vector));
+  }
+}
+/// The same bits as lanes of another scalar type of the same size.
+template <class To, class S, int W>
+BRECCIA_HD Pack<To, W> reinterpret(Pack<S, W> a) {
+  static_assert(sizeof(To) == sizeof(S));
+  if constexpr (detail::kIsWide<S, W>) {
+    return {reinterpret<To>(a.low), reinterpret<To>(a.high)};
+  } else {
+    return Pack<To, W>((typename Pack<To, W>::Vector)(a.v));
+  }
 }
 
 }  // namespace breccia

@@ -56,7 +56,9 @@ class HostEngine final : public Engine {
 
   // Sorting and migration (host_engine_sort.cpp, host_engine_connect.cpp, host_engine_insert.cpp).
   void settle(std::vector<Placement> placements);
+  [[nodiscard]] bool unbalanced(std::size_t particles) const;
   void choose_slabs(std::span<const Placement> placements);
+  [[nodiscard]] int longest_axis(std::span<const Placement> placements) const;
   [[nodiscard]] std::vector<Placement> place_all() const;
   void migrate(std::vector<Placement>& placements);
   void arrange(std::span<const Placement> placements);

@@ -64,15 +64,15 @@ template <class P>
 void HostEngine<P>::sort() {
   if (comm_.any(strayed_packs_ != 0)) {
     throw NumericsError(
-        "particles moved more than a cell between two sortings: the run is unstable, or numerics.sort_interval is too "
-        "long for its speeds");
+        "particles moved more than a cell between two sortings, or are not finite: the run is unstable (try a smaller "
+        "time.step), or numerics.sort_interval is too long for its speeds");
   }
   settle(place_all());
 }
 
 template <class P>
 void HostEngine<P>::settle(std::vector<Placement> placements) {
-  if (!slabs_chosen_) choose_slabs(placements);
+  if (!slabs_chosen_ || unbalanced(placements.size())) choose_slabs(placements);
   migrate(placements);
   arrange(placements);
   connect_tiles();
@@ -81,29 +81,42 @@ void HostEngine<P>::settle(std::vector<Placement> placements) {
 }
 
 template <class P>
+bool HostEngine<P>::unbalanced(std::size_t particles) const {
+  // Counts, not clocks: a run repeats bit for bit.
+  constexpr double kAllowed = 1.2;
+  const auto mine = static_cast<std::uint64_t>(particles);
+  const auto mean = static_cast<double>(comm_.sum(mine)) / comm_.size();
+  return comm_.size() > 1 && static_cast<double>(comm_.max(mine)) > kAllowed * mean;
+}
+
+template <class P>
 void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
-  // Along the longest extent of the matter: fewest shared nodes.
-  std::int32_t low[3] = {INT32_MAX, INT32_MAX, INT32_MAX};
-  std::int32_t high[3] = {INT32_MIN, INT32_MIN, INT32_MIN};
-  for (const Placement& p : placements) {
-    for (int axis = 0; axis < 3; ++axis) {
-      low[axis] = std::min(low[axis], p.node[axis]);
-      high[axis] = std::max(high[axis], p.node[axis]);
-    }
-  }
+  const int axis = slabs_chosen_ ? slabs_.axis() : longest_axis(placements);
+  mpi::PlaneWork work;
+  for (const Placement& p : placements) ++work[floor_div4(p.node[axis])];
+  slabs_ = mpi::Slabs::balanced(axis, work, comm_);
+  slabs_chosen_ = true;
+}
+
+template <class P>
+int HostEngine<P>::longest_axis(std::span<const Placement> placements) const {
+  // Slabs across the longest extent of the matter share the fewest nodes.
   int longest = 0;
   std::int64_t extent = -1;
   for (int axis = 0; axis < 3; ++axis) {
-    const std::int64_t length = std::int64_t{comm_.max(high[axis])} - comm_.min(low[axis]);
+    std::int32_t low = INT32_MAX;
+    std::int32_t high = INT32_MIN;
+    for (const Placement& p : placements) {
+      low = std::min(low, p.node[axis]);
+      high = std::max(high, p.node[axis]);
+    }
+    const std::int64_t length = std::int64_t{comm_.max(high)} - comm_.min(low);
     if (length > extent) {
       extent = length;
       longest = axis;
     }
   }
-  mpi::PlaneWork work;
-  for (const Placement& p : placements) ++work[floor_div4(p.node[longest])];
-  slabs_ = mpi::Slabs::balanced(longest, work, comm_);
-  slabs_chosen_ = true;
+  return longest;
 }
 
 template <class P>

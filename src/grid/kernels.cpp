@@ -56,7 +56,6 @@ void probe(const ProbeArguments<P>& a, std::uint32_t index) {
 template <class P>
 void update_blocks(const NodeArguments<P>& a, std::uint32_t first, std::uint32_t last) {
   using N = Node<P>;
-  const N kick(a.kick);
   for (std::size_t n = std::size_t{first} * kBlockNodes; n < std::size_t{last} * kBlockNodes; ++n) {
     typename P::Real* sums = a.sums + n * kChannels;
     typename P::Real* velocities = a.velocities + n * kChannels;
@@ -66,13 +65,16 @@ void update_blocks(const NodeArguments<P>& a, std::uint32_t first, std::uint32_t
       N{}.store(sums);
       continue;
     }
-    const N s = N::load(sums);
-    const N per_mass = s * N(typename P::Real(1) / mass);
-    const typename N::Vector zero{};
-    const N old(__builtin_shufflevector(per_mass.v, zero, 0, 1, 2, 0, 1, 2, 8, 8));
-    const N acceleration(__builtin_shufflevector(per_mass.v, zero, 3, 4, 5, 8, 8, 8, 8, 8));
-    const N node_mass(__builtin_shufflevector(s.v, zero, 8, 8, 8, 8, 8, 8, 6, 8));
-    (old + kick * acceleration + node_mass).store(velocities);
+    // Momentum and force per mass are velocity and acceleration.
+    const N per_mass = N::load(sums) * N(typename P::Real(1) / mass);
+    typename P::Real v[kChannels];
+    per_mass.store(v);
+    for (int axis = 0; axis < 3; ++axis) {
+      velocities[kNewVelocity + axis] = v[kMomentum + axis] + a.kick * v[kForce + axis];
+      velocities[kOldVelocity + axis] = v[kMomentum + axis];
+    }
+    velocities[kMass] = mass;
+    velocities[kMass + 1] = typename P::Real(0);
     N{}.store(sums);
   }
 }

@@ -56,7 +56,6 @@ BRECCIA_HD void store_state(const PassArguments<P>& a, const Fx& fx, std::size_t
 BRECCIA_HD Pack<std::int32_t, 16> move_axis(Pack<std::int32_t, 16>& offset, Pack<float, 16> cells) {
   using F = Pack<float, 16>;
   using I = Pack<std::int32_t, 16>;
-  using U = Pack<std::uint32_t, 16>;
   // Adding 1.5 * 2^23 rounds to the nearest integer.
   const F magic(12582912.0F);
   const F whole = (cells + magic) - magic;
@@ -65,9 +64,9 @@ BRECCIA_HD Pack<std::int32_t, 16> move_axis(Pack<std::int32_t, 16>& offset, Pack
   units = select(abs(units) < F(4194304.0F), (units + magic) - magic, units);
   units = min(max(units, F(-0x1p31F)), F(2147483520.0F));
   const I change = convert<std::int32_t>(units);
-  const I sum((typename I::Vector)((typename U::Vector)(offset.v) + (typename U::Vector)(change.v)));
-  const I overflow(((offset.v ^ sum.v) & (change.v ^ sum.v)) >> 31);
-  const I carry(((offset.v >> 31) | 1) & overflow.v);
+  const I sum = reinterpret<std::int32_t>(reinterpret<std::uint32_t>(offset) + reinterpret<std::uint32_t>(change));
+  const I overflow = ((offset ^ sum) & (change ^ sum)) >> 31;
+  const I carry = ((offset >> 31) | I(1)) & overflow;
   offset = sum;
   return convert<std::int32_t>(whole) + carry;
 }
@@ -100,7 +99,7 @@ BRECCIA_HD typename P::RealPack advance(const PassArguments<P>& a, Kinematics<P>
     const T cells = cells_per_speed * (updated[axis] + beta * d);
     largest = max(largest, abs(cells));
     const I change = move_axis(k.offset[axis], cells);
-    node.v += change.v << (8 * axis);
+    node += change << (8 * axis);
   }
   k.node = node;
   return select(k.mass > T(Real(0)), largest, T(Real(0)));
@@ -133,10 +132,10 @@ BRECCIA_HD void grow_damage(const PassArguments<P>& a, std::size_t i, typename P
   using T = typename P::RealPack;
   Flaws<P>& f = a.flaws[i];
   activate_flaws(a, f, material::principal_strain(s));
-  const T active = convert<Real>(typename P::IntPack(f.count.v & 0xffff));
+  const T active = convert<Real>(f.count & typename P::IntPack(0xffff));
   const auto growing = (active > T(Real(0))) & (s.damage_root < T(Real(1)));
   if (!any(growing)) return;
-  const T all = convert<Real>(typename P::IntPack(f.count.v >> 16));
+  const T all = convert<Real>(f.count >> 16);
   // All lanes that grow have flaws and mass; the others must not divide by zero.
   const T rate = T(c.crack_growth) / breccia::cbrt(select(growing, mass, T(Real(1))));
   const T root = material::grow_damage_root(s.damage_root, active, select(growing, all, T(Real(1))), rate * T(a.step));

@@ -16,7 +16,7 @@ BRECCIA_HD Pack<double, 8> offset_in_cells(Pack<double, 8> offset) { return offs
 template <int W>
 BRECCIA_HD Pack<std::int32_t, W> stencil_start(Pack<std::int32_t, W> node, int axis) {
   using I = Pack<std::int32_t, W>;
-  return I((node.v >> (8 * axis)) & 255) - I(kNodeBias - 1);
+  return ((node >> (8 * axis)) & I(255)) - I(kNodeBias - 1);
 }
 
 /// Weights w_k and first moments w_k r_k, r_k = (x_node - x_p)/dx, of three nodes along three axes.

@@ -79,7 +79,7 @@ class TilePass {
     for (int l = 0; l < lanes; ++l) {
       const Gathered<P> g = gather_lane<P>(scratch_.velocities, stencil_, l);
       value[l] = g.value;
-      xy[l] = low_halves(g.x, g.y);
+      xy[l] = join(lower(g.x), lower(g.y));
       z[l] = g.z;
     }
     for (int l = lanes; l < kLanes; ++l) value[l] = xy[l] = z[l] = Node<P>{};
@@ -168,7 +168,7 @@ class TilePass {
 
   BRECCIA_HD typename T::Mask is_material(std::size_t i, const material::Constants<Real>& c) const {
     const auto index = static_cast<std::int32_t>(&c - a_.materials);
-    const typename P::IntPack material(a_.identity[i].body_material.v >> 16);
+    const typename P::IntPack material = a_.identity[i].body_material >> 16;
     return convert<Real>(material) == T(static_cast<Real>(index));
   }
 

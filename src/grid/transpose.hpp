@@ -5,9 +5,10 @@
 
 namespace breccia::grid {
 
-/// Transposes 8 rows of 8 lanes in place.
+namespace detail {
+
 template <class S>
-BRECCIA_HD void transpose8(Pack<S, 8> (&row)[8]) {
+BRECCIA_HD void transpose8_in_registers(Pack<S, 8> (&row)[8]) {
   using V = typename Pack<S, 8>::Vector;
   V t[8];
   V u[8];
@@ -27,10 +28,28 @@ BRECCIA_HD void transpose8(Pack<S, 8> (&row)[8]) {
   }
 }
 
-/// Lanes 0-3 of a, then lanes 0-3 of b.
+// Registers too narrow for a row: the caches do it.
 template <class S>
-BRECCIA_HD Pack<S, 8> low_halves(Pack<S, 8> a, Pack<S, 8> b) {
-  return Pack<S, 8>(__builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 8, 9, 10, 11));
+BRECCIA_HD void transpose8_in_memory(Pack<S, 8> (&row)[8]) {
+  S from[8][8];
+  S to[8][8];
+  for (int i = 0; i < 8; ++i) row[i].store(from[i]);
+  for (int i = 0; i < 8; ++i) {
+    for (int j = 0; j < 8; ++j) to[j][i] = from[i][j];
+  }
+  for (int i = 0; i < 8; ++i) row[i] = Pack<S, 8>::load(to[i]);
+}
+
+}  // namespace detail
+
+/// Transposes 8 rows of 8 lanes in place.
+template <class S>
+BRECCIA_HD void transpose8(Pack<S, 8> (&row)[8]) {
+  if constexpr (breccia::detail::kIsWide<S, 8>) {
+    detail::transpose8_in_memory(row);
+  } else {
+    detail::transpose8_in_registers(row);
+  }
 }
 
 /// channels[c] gets channel c of all lanes from rows[lane]; W = 8 or 16 lanes.
@@ -45,8 +64,7 @@ BRECCIA_HD void rows_to_channels(const Pack<S, 8>* rows, Pack<S, W> (&channels)[
     if constexpr (W == 8) {
       channels[c] = half[0][c];
     } else {
-      channels[c].v =
-          __builtin_shufflevector(half[0][c].v, half[1][c].v, 0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
+      channels[c] = join(half[0][c], half[1][c]);
     }
   }
 }
@@ -59,10 +77,8 @@ BRECCIA_HD void channels_to_rows(const Pack<S, W> (&channels)[8], Pack<S, 8>* ro
     for (int c = 0; c < 8; ++c) {
       if constexpr (W == 8) {
         half[c] = channels[c];
-      } else if (h == 0) {
-        half[c].v = __builtin_shufflevector(channels[c].v, channels[c].v, 0, 1, 2, 3, 4, 5, 6, 7);
       } else {
-        half[c].v = __builtin_shufflevector(channels[c].v, channels[c].v, 8, 9, 10, 11, 12, 13, 14, 15);
+        half[c] = h == 0 ? lower(channels[c]) : upper(channels[c]);
       }
     }
     transpose8(half);

@@ -44,7 +44,13 @@ def run_program(command, ranks=1, cwd=None):
         command = [MPIRUN, "-n", str(ranks), *command]
     environment = dict(os.environ, OMPI_MCA_orte_execute_quiet="1")
     with subprocess.Popen(
-        command, cwd=cwd, env=environment, stdin=subprocess.DEVNULL, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        command,
+        cwd=cwd,
+        env=environment,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
     ) as process:
         try:
             output, errors = process.communicate(timeout=TIMEOUT)

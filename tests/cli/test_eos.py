@@ -74,8 +74,10 @@ class Eos(CommandTest):
 
     def test_wrong_states(self):
         for ranks in (1, 2):
-            self.assert_fails(breccia("eos", "granite", "--density", 1, "--energy", 0, ranks=ranks), 2, "granite", "basalt")
-            self.assert_fails(breccia("eos", "basalt", "--density", -5, "--energy", 0, ranks=ranks), 2, "density")
+            process = breccia("eos", "granite", "--density", 1, "--energy", 0, ranks=ranks)
+            self.assert_fails(process, 2, "granite", "basalt")
+            process = breccia("eos", "basalt", "--density", -5, "--energy", 0, ranks=ranks)
+            self.assert_fails(process, 2, "density")
 
     def test_unwritable_json_is_an_output_error(self):
         file = self.folder / "absent" / "state.json"

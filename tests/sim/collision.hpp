@@ -1,5 +1,4 @@
-// Two small bodies that are about to collide with every effect on: the scene of the tests of conservation and of
-// independence from ranks and threads.
+// Small scenes with every effect on: what the tests of conservation and of independence from ranks and threads run.
 #pragma once
 
 #include "tests/sim/simulation.hpp"
@@ -25,6 +24,35 @@ angle = "15 deg"
 separation = "106 km"
 [effects]
 gravity = "direct"
+[numerics]
+precision = "double"
+)";
+}
+
+/// A slab of rubble, 1 km cells, that slides over a rough floor in x and y; x repeats after `blocks` blocks of 4 cells.
+inline std::string periodic_slide(int blocks) {
+  const double length = 4e3 * blocks;
+  return "[scene]\nend = \"1000 s\"\n[grid]\ncell = \"1 km\"\n[time]\nstep = \"0.05 s\"\n" +
+         ("[[body]]\nshape = \"box\"\nlattice = \"cubic\"\nspacing = \"500 m\"\ndamage = 1\nsize = [\"" +
+          metres(length) + "\", \"3 km\", \"4 km\"]\nposition = [\"" + metres(0.5 * length)) +
+         R"(", 0, "2 km"]
+velocity = ["150 m/s", "20 m/s", "-5 m/s"]
+[[boundary]]
+normal = [0, 0, 1]
+kind = "friction"
+friction = 0.4
+[[boundary]]
+normal = [1, 0, 0]
+kind = "periodic"
+[[boundary]]
+normal = [-1, 0, 0]
+kind = "periodic"
+point = [")" +
+         metres(length) + R"(", 0, 0]
+[effects]
+gravity = "direct"
+[gravity]
+uniform = [0, 0, "-1 m/s2"]
 [numerics]
 precision = "double"
 )";
