@@ -8,8 +8,8 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "breccia/error.hpp"
 #include "breccia/constants.hpp"
+#include "breccia/error.hpp"
 #include "breccia/isa.hpp"
 #include "breccia/precision.hpp"
 #include "io/machine.hpp"
