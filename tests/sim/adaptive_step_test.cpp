@@ -64,8 +64,8 @@ struct Energies {
   double kinetic, residual;
 };
 Energies energies(const std::string& precision, const std::string& cfl) {
-  const Scene scene = load(kSoftCollision, {precision, cfl, "body[0].velocity=[\"1 m/s\", 0, 0]",
-                                            "body[1].velocity=[\"-1 m/s\", 0, 0]"});
+  const Scene scene = load(
+      kSoftCollision, {precision, cfl, "body[0].velocity=[\"1 m/s\", 0, 0]", "body[1].velocity=[\"-1 m/s\", 0, 0]"});
   std::optional<Budget> budget;
   io::DiagnosticsRow first, row;
   simulate(scene, [&](const TimeLoop& loop) {
@@ -79,8 +79,8 @@ Energies energies(const std::string& precision, const std::string& cfl) {
   return {row.kinetic_energy / first.kinetic_energy, row.energy_residual / first.kinetic_energy};
 }
 
-// On four cells per radius the transfer smooths away a quarter of the energy of the bounce. It may only lose energy, and
-// what it loses is a matter of the grid and hardly of the step; an unstable step gains energy without bound.
+// On four cells per radius the transfer smooths away a quarter of the energy of the bounce. It may only lose energy,
+// and what it loses is a matter of the grid and hardly of the step; an unstable step gains energy without bound.
 TEST_P(AdaptiveStep, KeepsTheEnergyOfSmallerSteps) {
   const Energies chosen = energies(precision(), "time.cfl=0.4");
   const Energies fine = energies(precision(), "time.cfl=0.1");

@@ -24,9 +24,9 @@ std::string plane_strain(double cell, double density, double bulk, double shear)
 }
 
 struct History {
-  double contact = 0.0;                    // when the first percent of the kinetic energy is gone [s]
-  double smallest_kinetic = 1.0;           // of the kinetic energy at the start
-  double kinetic = 1.0, residual = 0.0;    // at the end
+  double contact = 0.0;                     // when the first percent of the kinetic energy is gone [s]
+  double smallest_kinetic = 1.0;            // of the kinetic energy at the start
+  double kinetic = 1.0, residual = 0.0;     // at the end
   std::vector<analysis::Remnant> remnants;  // at the end
 };
 
@@ -37,7 +37,7 @@ History bounce(const Scene& scene, double end) {
   io::DiagnosticsRow first;
   simulate(scene, [&](const TimeLoop& loop) {
     const bool last = loop.time() >= end;
-    if (loop.step() % 4 != 0 && !last) return true;
+    if (loop.step() % 5 != 0 && !last) return true;
     if (!budget) budget.emplace(nullptr, Vec3d{}, self);
     const ParticleOutput p = loop.engine().observe();
     const io::DiagnosticsRow row = budget->row(loop.engine(), p, loop.lost_work());
@@ -84,7 +84,6 @@ TEST(Bounce, DiscsGiveTheirEnergyBack) {
   const double speed = 0.2 * std::sqrt(2.0);
   const double contact = (0.6 * std::sqrt(2.0) - 0.4) / speed;
   ASSERT_NEAR(contact, 1.586, 1e-3);
-  std::printf("contact %g min %g KE %g res %g\n", h.contact, h.smallest_kinetic, h.kinetic, h.residual);
   EXPECT_LT(h.contact, contact + kDiscCell / speed);
   EXPECT_GT(h.contact, contact - 2.0 * kDiscCell / speed);
   EXPECT_LT(h.smallest_kinetic, 0.1);
@@ -98,35 +97,38 @@ TEST(Bounce, DiscsGiveTheirEnergyBack) {
 TEST(Bounce, DiscsStayWhole) {
   const Scene scene = discs("numerics.asflip_beta=1");
   const History h = bounce(scene, 3.6);
-  std::printf("contact %g min %g KE %g res %g\n", h.contact, h.smallest_kinetic, h.kinetic, h.residual);
   EXPECT_LT(h.residual, 0.0);
   expect_two_whole(scene, h.remnants);
 }
 
-// Monaghan's rings: much thinner, bent far in the bounce. SPH without artificial stress breaks them.
+// Monaghan's rings: thin, and bent far in the bounce; a method that is unstable in tension breaks them. They turn round
+// with more than half of their speed, the rest vibrates.
 TEST(Bounce, RingsDoNotBreak) {
-  for (const char* ov : {"numerics.asflip_beta=1","numerics.asflip_beta=0"}) for (double cell: {0.25}) {
+  constexpr double kCell = 0.25;
+  constexpr double kSpacing = 0.5 * kCell;
   const Folder folder;
   ParticleFile rings;
-  const double spacing = 0.5 * cell;
-  for (int side : {-1, 1}) {
+  for (const int side : {-1, 1}) {
     for (int i = -40; i < 40; ++i) {
       for (int j = -40; j < 40; ++j) {
-        const double x = (i + 0.5) * spacing, y = (j + 0.5) * spacing;
+        const double x = (i + 0.5) * kSpacing, y = (j + 0.5) * kSpacing;
         const double r = std::sqrt(x * x + y * y);
         if (r < 3.0 || r > 4.0) continue;
         for (int k = 0; k < 4; ++k) {
-          rings.add({5.0 * side + x, y, (k + 0.5) * cell}, {-0.059 * side, 0.0, 0.0}, spacing * spacing * cell);
+          rings.add({5.0 * side + x, y, (k + 0.5) * kCell}, {-0.059 * side, 0.0, 0.0}, kSpacing * kSpacing * kCell);
         }
       }
     }
   }
   rings.write(folder.file("rings.hdf"));
-  const Scene scene = load(folder, plane_strain(cell, 1.0, 1.0, 0.22) + "[[body]]\nshape = \"particles\"\nfile = \"rings.hdf\"\n", {ov});
-  const History h = bounce(scene, 150);
-  std::printf("n %zu contact %g min %g KE %g res %g rem %zu :", (size_t)scene.bodies[0].particles, h.contact, h.smallest_kinetic, h.kinetic, h.residual, h.remnants.size());
-  for (auto& r : h.remnants) std::printf(" %zu(%g v %g)", (size_t)r.particles, r.position.x, r.velocity.x);
-  std::printf("\n");
+  const Scene scene =
+      load(folder, plane_strain(kCell, 1.0, 1.0, 0.22) + "[[body]]\nshape = \"particles\"\nfile = \"rings.hdf\"\n",
+           {"numerics.asflip_beta=0"});
+  const History h = bounce(scene, 130.0);
+  ASSERT_EQ(h.remnants.size(), 2U);
+  for (const analysis::Remnant& ring : h.remnants) {
+    EXPECT_EQ(ring.particles, scene.bodies[0].particles / 2);
+    EXPECT_GT(ring.velocity.x * std::copysign(1.0, ring.position.x), 0.5 * 0.059);
   }
 }
 

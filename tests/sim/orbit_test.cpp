@@ -14,7 +14,9 @@ constexpr double kSeparation = 200e3;
 class OneParticleBodies : public testing::TestWithParam<const char*> {
  protected:
   [[nodiscard]] static bool is_mixed() { return std::string(GetParam()) == "mixed"; }
-  [[nodiscard]] static std::vector<std::string> precision() { return {std::string("numerics.precision=") + GetParam()}; }
+  [[nodiscard]] static std::vector<std::string> precision() {
+    return {std::string("numerics.precision=") + GetParam()};
+  }
 };
 
 std::string circular_orbit() {
@@ -54,8 +56,9 @@ struct Pair {
 };
 
 // One orbit of 335,000 steps at the step of the flagship run. The leapfrog over windows of h = 3.9 s errs by
-// some (omega h)^2 = 3.6e-7 per radian in phase and inside a window in energy. Floats add a random walk: 6e-8 of v per step, 3e-5 after the orbit, three times
-// that in the phase: hence 1e-4 and 1e-3 (physics.md 7), which double must beat by far.
+// some (omega h)^2 = 3.6e-7 per radian in phase and inside a window in energy. Floats add a random walk: 6e-8 of v per
+// step, 3e-5 after the orbit, three times that in the phase: hence 1e-4 and 1e-3 (physics.md 7), which double must beat
+// by far.
 TEST_P(OneParticleBodies, StayOnAKeplerOrbit) {
   const double period = 2.0 * kPi * std::sqrt(kSeparation * kSeparation * kSeparation / kGravitation);
   ASSERT_NEAR(period, 40909.65, 0.01);
@@ -102,8 +105,8 @@ velocity = ["1 m/s", "-1 m/s", "0.1 m/s"]
   EXPECT_NEAR(moved.z, 1220.703125, tolerance);
 }
 
-// The leapfrog is exact for a constant acceleration: x and v at t_n are those of the parabola. Mixed: 8192 steps round a
-// velocity of up to 100 m/s to 4e-6 m/s, at random 4e-4 m/s; 0.4 m after 1000 s.
+// The leapfrog is exact for a constant acceleration: x and v at t_n are those of the parabola. Mixed: 8192 steps round
+// a velocity of up to 100 m/s to 4e-6 m/s, at random 4e-4 m/s; 0.4 m after 1000 s.
 TEST_P(OneParticleBodies, FallOnAParabola) {
   const Scene scene = load(kLoneParticle + R"(velocity = ["3 m/s", "-20 m/s", "5 m/s"]
 [gravity]

@@ -121,8 +121,8 @@ TEST(Ranks, FewerSlabsThanRanks) {
 }
 
 TEST(Ranks, OneParticleEach) {
-  const Work work = expect_same_as_one_rank(load(collision(9e3), {"body[0].particles=1", "body[1].particles=1"}),
-                                            {200e3, 200.0});
+  const Work work =
+      expect_same_as_one_rank(load(collision(9e3), {"body[0].particles=1", "body[1].particles=1"}), {200e3, 200.0});
   EXPECT_EQ(work.busy_ranks, std::min(2, ranks()));
 }
 

@@ -71,11 +71,12 @@ struct Settled {
   }
 };
 
-// The period is that of the lowest radial mode, x = 2.398106 with omega R = x c_l (28.52 s). The sphere has 10 cells per
-// radius and a surface as rough as a cell, so both the period and the settled pressure are off by a fraction of dx/R;
-// measured 1.2 % and 2.5 % here (1.7 % and 3.4 % at 8 cells). Pressure is averaged inside 0.6 R, over the particles and
-// over a period and more after q has damped the ringing, and compared with the exact profile at the same particles: one
-// particle in the centre is noisy. The mean displacement needs no stress; it counts the rough surface most: 3.4 %.
+// The period is that of the lowest radial mode, x = 2.398106 with omega R = x c_l (28.52 s). The sphere has 10 cells
+// per radius and a surface as rough as a cell, so both the period and the settled pressure are off by a fraction of
+// dx/R; measured 1.2 % and 2.5 % here (1.7 % and 3.4 % at 8 cells). Pressure is averaged inside 0.6 R, over the
+// particles and over a period and more after q has damped the ringing, and compared with the exact profile at the same
+// particles: one particle in the centre is noisy. The mean displacement needs no stress; it counts the rough surface
+// most: 3.4 %.
 TEST_P(ElasticSphere, RingsAndSettles) {
   const double period = 2.0 * kPi * kRadius / (2.398106 * kLongitudinalSpeed);
   ASSERT_NEAR(period, 28.520, 1e-3);

@@ -91,7 +91,8 @@ TEST_P(SlidingBlock, Accelerates) {
   EXPECT_NEAR(motion.velocity.x, acceleration * motion.time, 0.01 * acceleration);
   EXPECT_NEAR(motion.position.x, 0.5 * acceleration * motion.time * motion.time, 0.005 * acceleration);
 }
-INSTANTIATE_TEST_SUITE_P(Slopes, SlidingBlock, testing::Values(Slide{0.0, 0.3}, Slide{0.2, 0.4}, Slide{0.3, 0.6}, Slide{0.5, 1.0}));
+INSTANTIATE_TEST_SUITE_P(Slopes, SlidingBlock,
+                         testing::Values(Slide{0.0, 0.3}, Slide{0.2, 0.4}, Slide{0.3, 0.6}, Slide{0.5, 1.0}));
 
 // A slip plane pushes along its normal alone: along the plane the block falls freely, to the rounding of floats over
 // 700 steps.
@@ -148,6 +149,45 @@ uniform = [0, 0, "-10 m/s2"]
   EXPECT_NEAR(along, 6.0 * motion.time, 1e-4);
   // The ball sits on a few nodes of a staircase and sinks in by a cell at most.
   EXPECT_NEAR(across, 0.4, 0.1);
+}
+
+// A ball flies twice through the ends of a period of 1.2 m, whole and in a straight line; no position is ever outside.
+TEST(PeriodicPlanes, ContinueTheMotion) {
+  constexpr double kPeriod = 1.2;
+  const Scene scene = load(R"([scene]
+end = "10 s"
+[grid]
+cell = "0.1 m"
+[[body]]
+shape = "sphere"
+radius = "0.3 m"
+velocity = ["300 m/s", 0, 0]
+[effects]
+gravity = "off"
+[[boundary]]
+point = ["-0.6 m", 0, 0]
+normal = [1, 0, 0]
+kind = "periodic"
+[[boundary]]
+point = ["0.6 m", 0, 0]
+normal = [-1, 0, 0]
+kind = "periodic"
+)");
+  std::vector<Vec3d> start;
+  simulate(scene, [&](const TimeLoop& loop) {
+    const ParticleOutput p = loop.engine().observe();
+    if (start.empty()) {
+      start.resize(p.size());
+      for (std::size_t i = 0; i < p.size(); ++i) start[p.id[i]] = p.position[i];
+    }
+    for (std::size_t i = 0; i < p.size(); ++i) {
+      EXPECT_GE(p.position[i].x, -0.5 * kPeriod);
+      EXPECT_LT(p.position[i].x, 0.5 * kPeriod);
+      const double path = p.position[i].x - start[p.id[i]].x - 300.0 * loop.time();
+      EXPECT_NEAR(path - kPeriod * std::round(path / kPeriod), 0.0, 1e-5);
+    }
+    return loop.time() < 8e-3 && !testing::Test::HasFailure();
+  });
 }
 
 }  // namespace
