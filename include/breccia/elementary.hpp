@@ -8,9 +8,11 @@
 
 #include "breccia/macros.hpp"
 #include "breccia/math.hpp"
-#include "breccia/pack.hpp"
 
 namespace breccia {
+
+template <class S, int W>
+struct Pack;  // pack.hpp, host only
 
 namespace detail {
 
@@ -88,16 +90,7 @@ BRECCIA_HD double multiply_add(double a, double b, double c) {
 #endif
 }
 template <class S, int W>
-BRECCIA_HD Pack<S, W> multiply_add(Pack<S, W> a, Pack<S, W> b, Pack<S, W> c) {
-  if constexpr (kIsWide<S, W>) {
-    return {multiply_add(a.low, b.low, c.low), multiply_add(a.high, b.high, c.high)};
-  } else {
-    // g++ merges this loop into vector instructions.
-    typename Pack<S, W>::Vector r;
-    for (int i = 0; i < W; ++i) r[i] = multiply_add(a.v[i], b.v[i], c.v[i]);
-    return r;
-  }
-}
+BRECCIA_HD Pack<S, W> multiply_add(Pack<S, W> a, Pack<S, W> b, Pack<S, W> c);
 
 }  // namespace detail
 

@@ -9,6 +9,7 @@
 #include <type_traits>
 #include <utility>
 
+#include "breccia/elementary.hpp"
 #include "breccia/macros.hpp"
 
 namespace breccia {
@@ -291,5 +292,19 @@ BRECCIA_HD Pack<To, W> reinterpret(Pack<S, W> a) {
     return Pack<To, W>((typename Pack<To, W>::Vector)(a.v));
   }
 }
+
+namespace detail {
+template <class S, int W>
+BRECCIA_HD Pack<S, W> multiply_add(Pack<S, W> a, Pack<S, W> b, Pack<S, W> c) {
+  if constexpr (kIsWide<S, W>) {
+    return {multiply_add(a.low, b.low, c.low), multiply_add(a.high, b.high, c.high)};
+  } else {
+    // g++ merges this loop into vector instructions.
+    typename Pack<S, W>::Vector r;
+    for (int i = 0; i < W; ++i) r[i] = multiply_add(a.v[i], b.v[i], c.v[i]);
+    return r;
+  }
+}
+}  // namespace detail
 
 }  // namespace breccia

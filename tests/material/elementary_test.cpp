@@ -1,5 +1,6 @@
 // Own exp, log, log1p and cbrt against long double, in units in the last place.
 #include "breccia/elementary.hpp"
+#include "breccia/pack.hpp"
 
 #include <gtest/gtest.h>
 
