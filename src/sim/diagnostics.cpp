@@ -131,16 +131,19 @@ void Budget::follow(const io::DiagnosticsRow& row, double momentum_scale, double
   const auto grow = [](double& drift, double change, double scale) {
     if (scale > 0.0) drift = std::max(drift, change / scale);
   };
+  // Scales are the largest so far: bodies that come to rest must not make an old drift look larger.
+  momentum_scale_ = std::max(momentum_scale_, momentum_scale);
+  angular_scale_ = std::max(angular_scale_, angular_scale);
   energy_scale_ = std::max(energy_scale_, row.kinetic_energy + std::abs(row.gravitational_energy));
   grow(drift_.mass, std::abs(row.mass - first_.mass), first_.mass);
   grow(drift_.momentum,
        length({row.momentum_x - first_.momentum_x, row.momentum_y - first_.momentum_y,
                row.momentum_z - first_.momentum_z}),
-       momentum_scale);
+       momentum_scale_);
   grow(drift_.angular_momentum,
        length({row.angular_momentum_x - first_.angular_momentum_x, row.angular_momentum_y - first_.angular_momentum_y,
                row.angular_momentum_z - first_.angular_momentum_z}),
-       angular_scale);
+       angular_scale_);
   grow(drift_.energy, std::abs(row.energy_residual), energy_scale_);
 }
 

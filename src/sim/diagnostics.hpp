@@ -38,7 +38,9 @@ class Budget {
   mpi::Comm comm_;
   bool started_ = false;
   io::DiagnosticsRow first_;
-  double energy_scale_ = 0.0;
+  double momentum_scale_ = 0.0;  // largest sum m |v|
+  double angular_scale_ = 0.0;   // largest sum m |x cross v|
+  double energy_scale_ = 0.0;    // largest kinetic + |potential|
   io::Conservation drift_;
 };
 

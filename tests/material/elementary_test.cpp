@@ -1,6 +1,5 @@
 // Own exp, log, log1p and cbrt against long double, in units in the last place.
 #include "breccia/elementary.hpp"
-#include "breccia/pack.hpp"
 
 #include <gtest/gtest.h>
 
@@ -8,6 +7,8 @@
 #include <cstring>
 #include <limits>
 #include <random>
+
+#include "breccia/pack.hpp"
 
 namespace {
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <random>
 
+#include "breccia/pack.hpp"
 #include "random_tensors.hpp"
 
 namespace {

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "breccia/error.hpp"
+#include "breccia/pack.hpp"
 #include "material/eos.hpp"
 
 namespace {
