@@ -72,7 +72,8 @@ def surface(view, position, radius, pixels):
 
 def _blur(image, sigma):
     """Gaussian blur by two passes along the axes; the outside counts as zero."""
-    reach = max(1, int(3 * sigma))
+    # A kernel longer than the image would make np.convolve return its own length.
+    reach = min(max(1, int(3 * sigma)), (min(image.shape) - 1) // 2)
     weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
     weight /= weight.sum()
     for axis in (0, 1):
