@@ -64,9 +64,10 @@ void BoundarySet::find_nodes(std::span<const BlockKey> blocks) {
   for (std::size_t b = 0; b < blocks.size(); ++b) {
     const BlockCoord block = block_coord(blocks[b]);
     for (int n = 0; n < kBlockNodes; ++n) {
-      const Vec3d x = cell_ * Vec3d{static_cast<double>(kBlockWidth * block.x + n / 16),
-                                    static_cast<double>(kBlockWidth * block.y + n / 4 % 4),
-                                    static_cast<double>(kBlockWidth * block.z + n % 4)};
+      const int i = kBlockWidth * block.x + n / 16;
+      const int j = kBlockWidth * block.y + n / 4 % 4;
+      const int k = kBlockWidth * block.z + n % 4;
+      const Vec3d x = cell_ * Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
       for (std::size_t w = 0; w < walls_.size(); ++w) {
         // A node on the plane belongs to the wall; rounding of x must not decide.
         if (dot(x - walls_[w].point, walls_[w].normal) > 1e-6 * cell_) continue;
