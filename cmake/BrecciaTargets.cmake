@@ -12,7 +12,10 @@ target_compile_options(
             # False alarm of g++ 12 on string concatenation (GCC bug 105329).
             -Wno-restrict)
 if(BRECCIA_SANITIZE)
-  target_compile_options(breccia_options INTERFACE -fsanitize=${BRECCIA_SANITIZE} -fno-omit-frame-pointer)
+  target_compile_options(
+    breccia_options
+    INTERFACE $<$<NOT:$<BOOL:$<TARGET_PROPERTY:BRECCIA_WITHOUT_SANITIZERS>>>:-fsanitize=${BRECCIA_SANITIZE}>
+              -fno-omit-frame-pointer)
   target_link_options(breccia_options INTERFACE -fsanitize=${BRECCIA_SANITIZE})
 endif()
 
@@ -20,7 +23,8 @@ endif()
 # to instrument. What such a target reads and writes is checked by its callers' tests instead.
 function(breccia_without_sanitizers target)
   if(BRECCIA_SANITIZE)
-    target_compile_options(${target} PRIVATE -fno-sanitize=all -g0)
+    set_target_properties(${target} PROPERTIES BRECCIA_WITHOUT_SANITIZERS ON)
+    target_compile_options(${target} PRIVATE -g0)
   endif()
 endfunction()
 
