@@ -5,11 +5,19 @@
 namespace breccia::grid {
 namespace {
 
+// Zeroes the packs from `first` on; an empty rank has none.
+template <class T>
+void clear(std::vector<T>& packs, std::size_t first) {
+  if (packs.size() > first) {
+    std::memset(static_cast<void*>(packs.data() + first), 0, (packs.size() - first) * sizeof(T));
+  }
+}
+
 template <class T>
 std::vector<T> gathered(const std::vector<T>& old, std::span<const std::uint32_t> source, std::size_t lanes,
                         std::span<const FieldDescriptor> table, Group group) {
   std::vector<T> result(source.size() / lanes);
-  std::memset(static_cast<void*>(result.data()), 0, result.size() * sizeof(T));
+  clear(result, 0);
   const auto* from = reinterpret_cast<const std::byte*>(old.data());
   auto* to = reinterpret_cast<std::byte*>(result.data());
   for (const FieldDescriptor& field : table) {
@@ -113,7 +121,7 @@ template <class P>
 void ParticleStore<P>::allocate(std::size_t packs) {
   for_each_group([&](Group, auto& array) {
     array.resize(packs);
-    std::memset(static_cast<void*>(array.data()), 0, packs * sizeof(array[0]));
+    clear(array, 0);
   });
 }
 
@@ -122,7 +130,7 @@ void ParticleStore<P>::append_packs(std::size_t count) {
   for_each_group([&](Group, auto& array) {
     const std::size_t old = array.size();
     array.resize(old + count);
-    std::memset(static_cast<void*>(array.data() + old), 0, count * sizeof(array[0]));
+    clear(array, old);
   });
 }
 
