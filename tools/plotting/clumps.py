@@ -3,6 +3,9 @@
 import itertools
 
 import numpy as np
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import cKDTree
 
 # Half of the 26 neighbours of a cell of the mesh: the other half finds the same pairs from the other side.
 _HALF_NEIGHBOURS = [n for n in itertools.product((-1, 0, 1), repeat=3) if n > (0, 0, 0)]
@@ -11,12 +14,8 @@ _HALF_NEIGHBOURS = [n for n in itertools.product((-1, 0, 1), repeat=3) if n > (0
 def mean_spacing(position):
     """Distance of neighbours where the matter is dense [m]: that of a random sample to their nearest particle."""
     sample = np.random.default_rng(1).choice(len(position), size=min(200, len(position)), replace=False)
-    nearest = []
-    for index in sample:
-        distance2 = np.sum((position - position[index]) ** 2, axis=1)
-        distance2[index] = np.inf
-        nearest.append(distance2.min())
-    return float(np.sqrt(np.median(nearest)))
+    distance, _ = cKDTree(position).query(position[sample], k=2)
+    return float(np.median(distance[:, 1]))
 
 
 def _keys(cells):
@@ -35,20 +34,6 @@ def _pairs_of_touching_cells(cells):
     return np.concatenate(first), np.concatenate(second)
 
 
-def _connected(count, first, second):
-    """Labels of the connected components: every member takes the smallest label in reach."""
-    label = np.arange(count)
-    while True:
-        smaller = np.minimum(label[first], label[second])
-        new = label.copy()
-        np.minimum.at(new, label[first], smaller)
-        np.minimum.at(new, label[second], smaller)
-        new = new[new]
-        if np.array_equal(new, label):
-            return label
-        label = new
-
-
 def largest(position, length):
     """Mask of the particles in the largest group of occupied, touching cubes of side `length` [m]."""
     limit = 2**20 - 2  # cells along an axis that fit into a key; what is farther out joins no clump
@@ -58,6 +43,8 @@ def largest(position, length):
     unique, start, inverse = np.unique(_keys(cells)[order], return_index=True, return_inverse=True)
     cell_of_particle = np.empty(len(position), dtype=np.int64)
     cell_of_particle[order] = inverse.reshape(-1)
-    label = _connected(len(unique), *_pairs_of_touching_cells(cells[order][start]))
+    first, second = _pairs_of_touching_cells(cells[order][start])
+    touching = coo_matrix((np.ones(len(first), dtype=np.int8), (first, second)), shape=(len(unique), len(unique)))
+    _, label = connected_components(touching, directed=False)
     members = np.bincount(label[cell_of_particle])
     return label[cell_of_particle] == members.argmax()

@@ -3,6 +3,10 @@
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.ndimage import gaussian_filter
+
+# Radius [pixels] from which drawing one particle at a time is the quicker way.
+LARGE_DISC = 8.0
 
 
 @dataclass
@@ -45,40 +49,57 @@ def surface(view, position, radius, pixels):
     column, row, depth = project(view, position, pixels)
     r = max(0.75, radius * pixels / (2.0 * view.half))
     inside = np.flatnonzero((column > -r) & (column < pixels + r) & (row > -r) & (row < pixels + r))
-    column, row, depth = column[inside], row[inside], depth[inside]
+    draw = _draw_disc_by_disc if r > LARGE_DISC else _draw_pixel_by_pixel
+    buffer, particle = draw(column[inside], row[inside], depth[inside], r, pixels)
+    return Surface(buffer, np.where(particle >= 0, inside[particle], -1) if len(inside) else particle)
+
+
+def _draw_disc_by_disc(column, row, depth, r, pixels):
+    """Few and large: one particle after the other, each all its pixels."""
+    buffer = np.full((pixels, pixels), -np.inf)
+    particle = np.full((pixels, pixels), -1)
+    for index in range(len(depth)):
+        x = np.arange(max(0, int(column[index] - r)), min(pixels, int(column[index] + r) + 1))
+        y = np.arange(max(0, int(row[index] - r)), min(pixels, int(row[index] + r) + 1))[:, None]
+        off2 = (x + 0.5 - column[index]) ** 2 + (y + 0.5 - row[index]) ** 2
+        front = depth[index] + np.sqrt(np.maximum(r * r - off2, 0.0))
+        patch = np.ix_(y.ravel(), x)
+        closer = (off2 < r * r) & (front > buffer[patch])
+        buffer[patch] = np.where(closer, front, buffer[patch])
+        particle[patch] = np.where(closer, index, particle[patch])
+    return buffer, particle
+
+
+def _draw_pixel_by_pixel(column, row, depth, r, pixels):
+    """Many and small: one pixel of the disc after the other, each for all particles."""
     reach = int(np.ceil(r))
     # Far ones first: numpy lets the last assignment to a pixel win.
     order = np.argsort(depth, kind="stable")
+    column, row, depth = column[order], row[order], depth[order]
     buffer = np.full(pixels * pixels, -np.inf)
     particle = np.full(pixels * pixels, -1)
-    base_column, base_row = np.floor(column[order]).astype(int), np.floor(row[order]).astype(int)
+    base_column, base_row = np.floor(column).astype(int), np.floor(row).astype(int)
     for dy in range(-reach, reach + 1):
         for dx in range(-reach, reach + 1):
             x, y = base_column + dx, base_row + dy
-            off2 = (x + 0.5 - column[order]) ** 2 + (y + 0.5 - row[order]) ** 2
+            off2 = (x + 0.5 - column) ** 2 + (y + 0.5 - row) ** 2
             hit = (off2 < r * r) & (x >= 0) & (x < pixels) & (y >= 0) & (y < pixels)
             pixel = y[hit] * pixels + x[hit]
-            front = depth[order][hit] + np.sqrt(r * r - off2[hit])
+            front = depth[hit] + np.sqrt(r * r - off2[hit])
             by_depth = np.argsort(front, kind="stable")
-            pixel, front, who = pixel[by_depth], front[by_depth], inside[order][hit][by_depth]
+            pixel, front, who = pixel[by_depth], front[by_depth], order[hit][by_depth]
             nearest = np.full(pixels * pixels, -np.inf)
             winner = np.full(pixels * pixels, -1)
             nearest[pixel], winner[pixel] = front, who
             closer = nearest > buffer
             buffer[closer], particle[closer] = nearest[closer], winner[closer]
     shape = (pixels, pixels)
-    return Surface(buffer.reshape(shape), particle.reshape(shape))
+    return buffer.reshape(shape), particle.reshape(shape)
 
 
 def _blur(image, sigma):
-    """Gaussian blur by two passes along the axes; the outside counts as zero."""
-    # A kernel longer than the image would make np.convolve return its own length.
-    reach = min(max(1, int(3 * sigma)), (min(image.shape) - 1) // 2)
-    weight = np.exp(-0.5 * (np.arange(-reach, reach + 1) / sigma) ** 2)
-    weight /= weight.sum()
-    for axis in (0, 1):
-        image = np.apply_along_axis(np.convolve, axis, image, weight, mode="same")
-    return image
+    """Gaussian blur, not wider than the picture; the outside counts as zero."""
+    return gaussian_filter(image, min(sigma, min(image.shape) / 8), mode="constant", truncate=3.0)
 
 
 def _blur_seen(values, seen, sigma):
