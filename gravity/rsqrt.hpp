@@ -11,14 +11,6 @@
 
 namespace breccia::gravity::BRECCIA_ISA {
 
-#if defined(__AVX512F__)
-inline constexpr int kRegisterBytes = 64;
-#elif defined(__AVX__)
-inline constexpr int kRegisterBytes = 32;
-#else
-inline constexpr int kRegisterBytes = 16;
-#endif
-
 template <class Real>
 using RegisterPack = Pack<Real, kRegisterBytes / static_cast<int>(sizeof(Real))>;
 

@@ -251,8 +251,8 @@ BRECCIA_HD Pack<S, W> sqrt(Pack<S, W> a) {
     return {sqrt(a.low), sqrt(a.high)};
   } else {
     // g++ merges this loop into one vector square root (with -fno-math-errno).
-    typename Pack<S, W>::Vector r;
-    for (int i = 0; i < W; ++i) r[i] = std::sqrt(a.v[i]);
+    typename Pack<S, W>::Vector r = a.v;
+    for (int i = 0; i < W; ++i) r[i] = std::sqrt(r[i]);
     return r;
   }
 }

@@ -5,7 +5,7 @@
 
 namespace breccia::io {
 
-/// docs/output_files.md, Markdown.
+/// docs/output-files.md, Markdown.
 std::string output_reference();
 
 }  // namespace breccia::io

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <vector>
 
 #include "breccia/error.hpp"
 
@@ -12,16 +13,6 @@ namespace breccia::sim {
 namespace {
 
 double length(Vec3d v) { return std::sqrt(dot(v, v)); }
-
-// Sum of m phi / 2 over this rank's particles.
-double self_gravity_energy(gravity::Solver& solver, const ParticleOutput& p) {
-  std::vector<Vec3d> acceleration(p.size());
-  std::vector<double> potential(p.size());
-  solver.evaluate({p.position, p.mass}, acceleration, potential);
-  double energy = 0.0;
-  for (std::size_t i = 0; i < p.size(); ++i) energy += 0.5 * p.mass[i] * potential[i];
-  return energy;
-}
 
 // Sums over the particles of one rank; a plain array for one reduction.
 enum Sum {
@@ -48,6 +39,14 @@ enum Sum {
 
 }  // namespace
 
+std::vector<double> Budget::potential(const ParticleOutput& p) const {
+  if (solver_ == nullptr) return {};
+  std::vector<Vec3d> acceleration(p.size());
+  std::vector<double> potential(p.size());
+  solver_->evaluate({p.position, p.mass}, acceleration, potential);
+  return potential;
+}
+
 io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput& p, const LostWork& lost) {
   std::array<double, kSums> s{};
   double max_speed = 0.0;
@@ -70,7 +69,8 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
     s[kAngularScale] += length(angular);
     max_speed = std::max(max_speed, speed);
   }
-  if (solver_ != nullptr) s[kGravity] += self_gravity_energy(*solver_, p);
+  const std::vector<double> self_gravity = potential(p);
+  for (std::size_t i = 0; i < self_gravity.size(); ++i) s[kGravity] += 0.5 * p.mass[i] * self_gravity[i];
   s[kElastic] = engine.elastic_energy();
   s[kPlastic] = lost.plastic;
   s[kViscous] = lost.viscous;

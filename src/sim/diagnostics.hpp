@@ -26,6 +26,9 @@ class Budget {
   /// or mass is missing; time, step, dt and wall_seconds are left to the caller.
   io::DiagnosticsRow row(const grid::Engine& engine, const ParticleOutput& particles, const LostWork& lost);
 
+  /// Self-gravity at each particle [J/kg]; empty without a solver. Collective.
+  [[nodiscard]] std::vector<double> potential(const ParticleOutput& particles) const;
+
   /// Largest drifts seen so far.
   [[nodiscard]] const io::Conservation& drift() const { return drift_; }
 

@@ -68,7 +68,8 @@ class Output {
 
   nlohmann::json remnants(const ParticleOutput& particles) const {
     const double link = scene_.output.link_cells * scene_.cell;
-    return io::remnants_json(analysis::find_remnants(particles, link, target_mass(scene_), comm_));
+    const std::vector<double> potential = budget_.potential(particles);
+    return io::remnants_json(analysis::find_fragments(particles, link, target_mass(scene_), comm_, potential).remnants);
   }
   [[nodiscard]] const io::DiagnosticsRow& last_row() const { return last_row_; }
 

@@ -23,7 +23,7 @@ TEST(OutputReference, EveryFieldAndColumnIsThere) {
 
 // BRECCIA_WRITE_DOCS=1 writes the page anew.
 TEST(OutputReference, PageIsUpToDate) {
-  const std::string path = BRECCIA_SOURCE_DIR "/docs/output_files.md";
+  const std::string path = BRECCIA_SOURCE_DIR "/docs/output-files.md";
   if (std::getenv("BRECCIA_WRITE_DOCS") != nullptr) std::ofstream(path) << output_reference();
   std::ifstream stream(path);
   std::ostringstream page;

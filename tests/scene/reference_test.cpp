@@ -14,14 +14,14 @@ namespace {
 
 const std::filesystem::path kSource = BRECCIA_SOURCE_DIR;
 
-// With BRECCIA_UPDATE_REFERENCE set in the environment the file is written anew instead.
+// With BRECCIA_WRITE_DOCS set in the environment the file is written anew instead.
 TEST(Reference, CommittedFileIsCurrent) {
   const auto path = kSource / "docs" / "scene-reference.md";
-  if (std::getenv("BRECCIA_UPDATE_REFERENCE") != nullptr) std::ofstream(path) << reference_markdown();
+  if (std::getenv("BRECCIA_WRITE_DOCS") != nullptr) std::ofstream(path) << reference_markdown();
   std::ostringstream committed;
   committed << std::ifstream(path).rdbuf();
   EXPECT_EQ(committed.str(), reference_markdown())
-      << "run test_scene_reference with BRECCIA_UPDATE_REFERENCE=1 and commit the file";
+      << "run test_scene_reference with BRECCIA_WRITE_DOCS=1 and commit the file";
 }
 
 TEST(Reference, ReadyScenesLoad) {
