@@ -1,6 +1,7 @@
 #include "bench/engine_bench.hpp"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <sys/resource.h>
 
 #include <algorithm>
@@ -8,50 +9,15 @@
 #include <fstream>
 #include <nlohmann/json.hpp>
 
-#include "breccia/constants.hpp"
+#include "bench/engine_cases.hpp"
 #include "breccia/error.hpp"
 #include "breccia/isa.hpp"
 #include "breccia/precision.hpp"
 #include "io/machine.hpp"
-#include "scene/bodies.hpp"
-#include "scene/orbit.hpp"
 #include "sim/setup.hpp"
 
 namespace breccia::bench {
 namespace {
-
-// Two spheres of radius 50 km on the orbit of the paper's flagship (physics.md 6).
-Scene two_spheres(std::uint64_t particles_each, double particles_per_cell, Precision precision) {
-  Scene scene;
-  scene.name = "bench";
-  scene.materials.resize(1);
-  const double radius = 50e3;
-  const double volume = 4.0 / 3.0 * kPi * radius * radius * radius;
-  scene.cell = std::cbrt(particles_per_cell * volume / static_cast<double>(particles_each));
-  for (int b = 0; b < 2; ++b) {
-    BodyParameters body;
-    body.name = b == 0 ? "target" : "impactor";
-    body.semi_axes = {radius, radius, radius};
-    body.particles = particles_each;
-    body.first_id = static_cast<std::uint64_t>(b) * particles_each;
-    body.mass = volume * scene.materials[0].eos.rho0;
-    scene.bodies.push_back(body);
-  }
-  scene.impact = ImpactParameters{200.0, 15.0 * kPi / 180.0, 4.0 * radius};
-  scene.effects.gravity = GravityMethod::kOff;
-  scene.numerics.precision = precision;
-  // The paper's step, scaled with the cell.
-  scene.time.step = 1e5 / 819200.0 * scene.cell / 2500.0;
-  scene::place_on_orbit(scene);
-  return scene;
-}
-
-struct Case {
-  const char* name;
-  std::uint64_t particles_each;
-  double particles_per_cell;
-};
-constexpr Case kCases[] = {{"paper", 47324, 1.412}, {"cell8_1e6", 500000, 8.0}};
 
 double user_seconds() {
   rusage usage{};
@@ -59,7 +25,7 @@ double user_seconds() {
   return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
 }
 
-// One sort cycle: 31 fused steps and one in two halves around a sorting.
+// One sort cycle: fused steps and one in two halves around a sorting.
 void one_cycle(grid::Engine& engine, double dt, int interval) {
   for (int n = 1; n < interval; ++n) {
     engine.update_grid(dt);
@@ -77,11 +43,10 @@ struct Measured {
   double bytes_per_particle = 0.0;
 };
 
-Measured measure(const Case& c, Precision precision, int threads, double seconds) {
-  const Scene scene = two_spheres(c.particles_each, c.particles_per_cell, precision);
-  const sim::ResolvedEffects effects = sim::resolve_effects(scene);
+Measured measure(const EngineCase& c, const EffectChoice& effects, Precision precision, int threads, double seconds) {
+  const Scene scene = make_scene(c, effects, precision);
   const mpi::Comm self(MPI_COMM_SELF);
-  const auto engine = sim::make_loaded_engine(scene, effects, threads, self);
+  const auto engine = sim::make_loaded_engine(scene, sim::resolve_effects(scene), make_state(c, scene), threads, self);
   const double dt = *scene.time.step;
   const int interval = scene.numerics.sort_interval;
   engine->scatter(0.5 * dt);
@@ -105,41 +70,91 @@ Measured measure(const Case& c, Precision precision, int threads, double seconds
   return best;
 }
 
+template <class Named>
+std::vector<Named> chosen(std::span<const Named> all, const std::vector<std::string>& names) {
+  std::vector<Named> found;
+  std::vector<std::string_view> known;
+  for (const Named& item : all) {
+    known.push_back(item.name);
+    if (std::find(names.begin(), names.end(), item.name) != names.end()) found.push_back(item);
+  }
+  if (found.size() != names.size()) {
+    throw UsageError(fmt::format("{}: unknown; there are {}", fmt::join(names, ", "), fmt::join(known, ", ")));
+  }
+  return found;
+}
+
+std::vector<Precision> chosen_precisions(const std::string& name) {
+  if (name == MixedPrecision::kName) return {Precision::kMixed};
+  if (name == DoublePrecision::kName) return {Precision::kDouble};
+  return {Precision::kMixed, Precision::kDouble};
+}
+
+const char* name_of(Precision precision) {
+  return precision == Precision::kMixed ? MixedPrecision::kName : DoublePrecision::kName;
+}
+
+// The lines of the table: every state with all effects, and the paper's with one effect less at a time.
+struct Row {
+  EngineCase state;
+  EffectChoice effects;
+};
+std::vector<Row> rows(const EngineBenchOptions& options) {
+  const bool standard = options.cases.empty() && options.effects.empty();
+  std::vector<std::string> cases = options.cases;
+  if (cases.empty()) cases = {"paper"};
+  if (standard && !options.quick) cases = {"paper", "debris", "cell8_1e5", "cell8_1e6"};
+  std::vector<std::string> effects = options.effects;
+  if (effects.empty()) effects = {"all"};
+  std::vector<Row> all;
+  for (const EngineCase& c : chosen(engine_cases(), cases)) {
+    for (const EffectChoice& e : chosen(effect_choices(), effects)) all.push_back({c, e});
+  }
+  if (standard && !options.quick) {
+    for (const EffectChoice& e : effect_choices().subspan(1)) all.push_back({engine_cases().front(), e});
+  }
+  return all;
+}
+
 }  // namespace
 
 void run_engine_bench(const EngineBenchOptions& options) {
+  const std::vector<Row> table_rows = rows(options);
+  const std::vector<int> cores = options.cores.empty() ? std::vector<int>{1, 2} : options.cores;
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
   const io::Machine machine = io::this_machine();
   std::FILE* table = options.json == "-" ? stderr : stdout;
   fmt::print(table, "{}, {}, {}; no gravity, sorting included, best cycle of {} steps\n", machine.cpu_model,
-             isa_name(active_isa()), io::library_versions().at(1).second, 32);
-  fmt::print(table, "{:<10} {:<6} {:>5} {:>24} {:>24} {:>15}\n", "case", "prec.", "cores", "Mp-steps/s of CPU time",
-             "Mp-steps/s of wall time", "bytes/particle");
-  for (const Case& c : kCases) {
-    if (options.quick && c.particles_each > 100000) continue;
-    for (const Precision precision : {Precision::kMixed, Precision::kDouble}) {
-      for (const int cores : {1, 2}) {
-        const Measured m = measure(c, precision, cores, options.quick ? 2.0 : 8.0);
-        const char* name = precision == Precision::kMixed ? MixedPrecision::kName : DoublePrecision::kName;
-        fmt::print(table, "{:<10} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}\n", c.name, name, cores, 1e-6 * m.rate,
-                   1e-6 * m.wall_rate, m.bytes_per_particle);
+             isa_name(active_isa()), io::library_versions().at(1).second, NumericsParameters{}.sort_interval);
+  fmt::print(table, "{:<10} {:<13} {:<6} {:>5} {:>24} {:>24} {:>15}\n", "case", "effects", "prec.", "cores",
+             "Mp-steps/s of CPU time", "Mp-steps/s of wall time", "bytes/particle");
+  for (const Row& row : table_rows) {
+    for (const Precision precision : chosen_precisions(options.precision)) {
+      for (const int threads : cores) {
+        const Measured m = measure(row.state, row.effects, precision, threads, options.seconds);
+        fmt::print(table, "{:<10} {:<13} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}\n", row.state.name, row.effects.name,
+                   name_of(precision), threads, 1e-6 * m.rate, 1e-6 * m.wall_rate, m.bytes_per_particle);
         std::fflush(table);
-        results.push_back({{"case", c.name},
-                           {"precision", name},
-                           {"cores", cores},
-                           {"effects", "all"},
-                           {"particle_steps_per_second", cores == 1 ? m.rate : m.wall_rate},
+        results.push_back({{"case", row.state.name},
+                           {"precision", name_of(precision)},
+                           {"cores", threads},
+                           {"effects", row.effects.name},
+                           {"particle_steps_per_second", threads == 1 ? m.rate : m.wall_rate},
                            {"particle_steps_per_cpu_second", m.rate},
                            {"particle_steps_per_wall_second", m.wall_rate},
                            {"bytes_per_particle", m.bytes_per_particle}});
       }
     }
   }
+  const nlohmann::ordered_json document = {{"machine", machine.cpu_model},
+                                           {"instruction_set", isa_name(active_isa())},
+                                           {"compiler", io::library_versions().at(1).second},
+                                           {"results", results}};
   if (options.json == "-") {
-    fmt::print("{}\n", results.dump(2));
+    fmt::print("{}\n", document.dump(2));
   } else if (!options.json.empty()) {
     std::ofstream file(options.json);
-    file << results.dump(2) << '\n';
+    file << document.dump(2) << '\n';
     if (!file) throw IoError(options.json + ": cannot be written");
   }
 }

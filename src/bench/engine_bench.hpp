@@ -2,16 +2,23 @@
 #pragma once
 
 #include <string>
+#include <vector>
 
 namespace breccia::bench {
 
+/// What to measure; empty lists mean the standard choice.
 struct EngineBenchOptions {
-  bool quick = false;  ///< small cases, about a minute
-  std::string json;    ///< file for the results, "-" for standard output, empty for none
+  bool quick = false;                ///< the paper's state with all effects only
+  std::vector<std::string> cases;    ///< names of engine_cases()
+  std::vector<std::string> effects;  ///< names of effect_choices()
+  std::string precision;             ///< mixed or double; empty: both
+  std::vector<int> cores;            ///< threads
+  double seconds = 6.0;              ///< least time of a measurement
+  std::string json;                  ///< file for the results, "-" for standard output, empty for none
 };
 
-/// Measures particle-steps/s and bytes per particle: paper spheres (94,648 particles at 1.41 per cell) and 1e6 at 8 per
-/// cell, mixed and double precision, one and two threads. Throws IoError if the file cannot be written.
+/// Measures particle-steps/s and bytes per particle and prints a line for each combination. Throws UsageError for a
+/// name that is unknown and IoError if the file cannot be written.
 void run_engine_bench(const EngineBenchOptions& options);
 
 }  // namespace breccia::bench

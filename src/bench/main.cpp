@@ -12,7 +12,12 @@ int main(int argc, char** argv) {
   app.require_subcommand(1);
   breccia::bench::EngineBenchOptions options;
   CLI::App* engine = app.add_subcommand("engine", "particle-steps per second of the host engine");
-  engine->add_flag("--quick", options.quick, "small cases only, about a minute");
+  engine->add_flag("--quick", options.quick, "the paper's state with all effects only, half a minute");
+  engine->add_option("--case", options.cases, "paper, debris, cell8_1e5, cell8_1e6, cell8_1e7");
+  engine->add_option("--effects", options.effects, "all, or one of those 'no ...'");
+  engine->add_option("--precision", options.precision, "mixed or double")->check(CLI::IsMember({"mixed", "double"}));
+  engine->add_option("--cores", options.cores, "numbers of threads")->check(CLI::PositiveNumber);
+  engine->add_option("--seconds", options.seconds, "least time of a measurement")->capture_default_str();
   engine->add_option("--json", options.json, "file for the results, - for standard output");
   try {
     app.parse(argc, argv);

@@ -25,6 +25,8 @@ constexpr bool kHaveV2 = true;
 constexpr bool kHaveV2 = false;
 #endif
 
+}  // namespace
+
 bool available(Isa isa) {
   switch (isa) {
     case Isa::kV4:
@@ -36,6 +38,8 @@ bool available(Isa isa) {
   }
   return false;
 }
+
+namespace {
 
 std::string_view short_name(Isa isa) {
   switch (isa) {

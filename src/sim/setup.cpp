@@ -33,6 +33,11 @@ material::FlawLists draw_all_flaws(const Scene& scene, const ParticleArrays& par
 
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
                                                  const mpi::Comm& comm) {
+  return make_loaded_engine(scene, effects, scene::make_particles(scene, comm), threads, comm);
+}
+
+std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
+                                                 const ParticleArrays& particles, int threads, const mpi::Comm& comm) {
   grid::EngineSetup setup;
   setup.cell = scene.cell;
   setup.materials = scene.materials;
@@ -44,7 +49,6 @@ std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const Resol
   setup.threads = threads;
   auto engine = grid::make_engine(setup, comm);
 
-  const ParticleArrays particles = scene::make_particles(scene, comm);
   material::FlawLists flaws;
   if (effects.material.damage) {
     flaws = draw_all_flaws(scene, particles);

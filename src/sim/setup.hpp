@@ -12,6 +12,9 @@ namespace breccia::sim {
 /// An engine with the particles, flaws and spins of the scene. Collective.
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
                                                  const mpi::Comm& comm);
+/// The same with these particles of this rank, ordered by id, in place of those the scene makes.
+std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
+                                                 const ParticleArrays& particles, int threads, const mpi::Comm& comm);
 
 /// Bytes of all fields of a particle, flaw thresholds (mean number) and sorting included, without the grid.
 double bytes_per_particle(const Scene& scene, const ResolvedEffects& effects);

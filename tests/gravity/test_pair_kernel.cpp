@@ -19,13 +19,13 @@ template <class Real>
 std::vector<Kernel<Real>> kernels() {
   std::vector<Kernel<Real>> all;
 #ifdef BRECCIA_HAVE_V2
-  if (__builtin_cpu_supports("x86-64-v2")) all.push_back(&isa_v2::sum_pairs);
+  if (available(Isa::kV2)) all.push_back(&isa_v2::sum_pairs);
 #endif
 #ifdef BRECCIA_HAVE_V3
-  if (__builtin_cpu_supports("x86-64-v3")) all.push_back(&isa_v3::sum_pairs);
+  if (available(Isa::kV3)) all.push_back(&isa_v3::sum_pairs);
 #endif
 #ifdef BRECCIA_HAVE_V4
-  if (__builtin_cpu_supports("x86-64-v4")) all.push_back(&isa_v4::sum_pairs);
+  if (available(Isa::kV4)) all.push_back(&isa_v4::sum_pairs);
 #endif
   all.push_back(&sum_pairs);
   return all;
