@@ -3,6 +3,8 @@
 // the layout in memory is the same on every instruction set.
 #pragma once
 
+#include <immintrin.h>
+
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -162,6 +164,20 @@ BRECCIA_HD Pack<S, 2 * W> concatenated(Pack<S, W> a, Pack<S, W> b, std::index_se
 }
 }  // namespace detail
 
+/// Eight lanes rearranged: lane i of the result is lane kFrom[i] of a.
+template <int... kFrom, class S>
+BRECCIA_HD Pack<S, 8> rearranged(Pack<S, 8> a) {
+  static_assert(sizeof...(kFrom) == 8);
+  if constexpr (detail::kIsWide<S, 8>) {
+    S from[8];
+    a.store(from);
+    const S to[8] = {from[kFrom]...};
+    return Pack<S, 8>::load(to);
+  } else {
+    return Pack<S, 8>(__builtin_shufflevector(a.v, a.v, kFrom...));
+  }
+}
+
 /// First and second half of the lanes.
 template <class S, int W>
 BRECCIA_HD Pack<S, W / 2> lower(Pack<S, W> a) {
@@ -213,15 +229,34 @@ BRECCIA_HD PackMask<I, W> operator!(PackMask<I, W> a) {
     return {~a.v};
   }
 }
+namespace detail {
+// g++ 12 makes a tree of shuffles of a plain loop over the lanes.
+template <class V>
+BRECCIA_HD bool any_bit(V mask) {
+  if constexpr (sizeof(V) == 64) {
+#if defined(__AVX512F__)
+    return _mm512_test_epi32_mask(__builtin_bit_cast(__m512i, mask), __builtin_bit_cast(__m512i, mask)) != 0;
+#endif
+  } else if constexpr (sizeof(V) == 32) {
+#if defined(__AVX2__)
+    return _mm256_movemask_epi8(__builtin_bit_cast(__m256i, mask)) != 0;
+#endif
+  } else {
+    static_assert(sizeof(V) <= 16);
+    std::uint64_t bits[2] = {0, 0};
+    std::memcpy(bits, &mask, sizeof(V));
+    return (bits[0] | bits[1]) != 0;
+  }
+}
+}  // namespace detail
+
 /// True where any lane is set.
 template <class I, int W>
 BRECCIA_HD bool any(PackMask<I, W> m) {
   if constexpr (detail::kIsWide<I, W>) {
     return any(m.low | m.high);
   } else {
-    I r = 0;
-    for (int i = 0; i < W; ++i) r |= m.v[i];
-    return r != 0;
+    return detail::any_bit(m.v);
   }
 }
 

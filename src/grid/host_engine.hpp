@@ -92,6 +92,7 @@ class HostEngine final : public Engine {
   ParticleStore<P> store_;
   std::vector<float> flaw_thresholds_;
   std::vector<Tile> tiles_;
+  std::vector<TileBox> boxes_;
   std::vector<std::vector<TilePlane>> planes_of_colour_;
   BlockTable blocks_;
   std::vector<Real> sums_;

@@ -40,6 +40,7 @@ ParticleOutput HostEngine<P>::observe() const {
   std::vector<Real> node_mass(store_.packs() * kLanes);
   ProbeArguments<P> probe;
   probe.tiles = tiles_.data();
+  probe.boxes = boxes_.data();
   probe.kinematics = store_.kinematics.data();
   probe.velocities = velocities_.data();
   probe.transfer = transfer_;

@@ -183,6 +183,7 @@ void HostEngine<P>::arrange(std::span<const Placement> placements) {
     ++place[rank[met[i]] * kBlockNodes + cell_in_block(placements[i].node)];
   }
   tiles_.assign(keys.size(), Tile{});
+  boxes_.assign(keys.size(), kWholeTile);
   std::uint32_t packs = 0;
   for (std::uint32_t t = 0; t < tiles_.size(); ++t) {
     tiles_[t].block = t;

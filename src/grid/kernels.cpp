@@ -20,7 +20,7 @@ template <class P>
 void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
   const material::RuntimeEffects& fx = a.effects;
   const auto run = [&](const auto& effects)
-                       BRECCIA_INLINE_LAMBDA { TilePass(a, effects, scratch<P>()).run(a.tiles[tile], report); };
+                       BRECCIA_INLINE_LAMBDA { TilePass(a, effects, scratch<P>()).run(tile, report); };
   if (matches<material::RockEffects>(fx)) {
     run(material::RockEffects{});
   } else if (matches<material::GranularEffects>(fx)) {
@@ -35,22 +35,36 @@ void probe(const ProbeArguments<P>& a, std::uint32_t index) {
   using Real = typename P::Real;
   const Tile& tile = a.tiles[index];
   TileScratch<P>& nodes = scratch<P>();
-  load_tile<P>(tile, a.velocities, nodes.velocities);
+  load_tile<P>(tile, a.boxes[index], a.velocities, nodes.velocities);
   Stencil<P> stencil;
   const auto alpha = static_cast<Real>(a.transfer.alpha);
-  for (std::uint32_t n = 0; n < tile.particles; ++n) {
-    const std::size_t pack = tile.first_pack + n / P::kLanes;
-    const int lane = static_cast<int>(n % P::kLanes);
-    if (lane == 0) stencil.set(a.kinematics[pack]);
-    const Node<P> v = gather_lane<P>(nodes.velocities, stencil, lane).value;
-    const std::size_t slot = pack * P::kLanes + static_cast<std::size_t>(lane);
-    for (int axis = 0; axis < 3; ++axis) {
-      const Real old = a.kinematics[pack].velocity[axis][lane];
-      a.new_velocity[3 * slot + static_cast<std::size_t>(axis)] =
-          v[kNewVelocity + axis] + alpha * (old - v[kOldVelocity + axis]);
+  for (std::uint32_t first = 0; first < tile.particles; first += P::kLanes) {
+    const std::size_t pack = tile.first_pack + first / P::kLanes;
+    const auto left = static_cast<int>(tile.particles - first);
+    const int lanes = left < P::kLanes ? left : P::kLanes;
+    const Kinematics<P>& k = a.kinematics[pack];
+    stencil.set(k);
+    const GatheredVelocity<P> grid = gather<P>(nodes.velocities, stencil, lanes);
+    for (int lane = 0; lane < lanes; ++lane) {
+      const std::size_t slot = pack * P::kLanes + static_cast<std::size_t>(lane);
+      for (std::size_t axis = 0; axis < 3; ++axis) {
+        a.new_velocity[3 * slot + axis] = grid.value[kNewVelocity + axis][lane] +
+                                          alpha * (k.velocity[axis][lane] - grid.value[kOldVelocity + axis][lane]);
+      }
+      a.node_mass[slot] = grid.value[kMass][lane];
     }
-    a.node_mass[slot] = v[kMass];
   }
+}
+
+// [p f m 0] to [p/m f/m 1 0] to [v_new v_old m 0].
+template <class P>
+BRECCIA_HD Node<P> node_velocities(Node<P> sums, typename P::Real mass, typename P::Real kick) {
+  using Real = typename P::Real;
+  const Node<P> per_mass = sums * Node<P>(Real(1) / mass);
+  const Node<P> velocity = rearranged<0, 1, 2, 0, 1, 2, 7, 7>(per_mass);
+  const Node<P> acceleration = rearranged<3, 4, 5, 7, 7, 7, 7, 7>(per_mass);
+  const Node<P> mass_alone = rearranged<7, 7, 7, 7, 7, 7, 6, 7>(sums);
+  return velocity + Node<P>(kick) * acceleration + mass_alone;
 }
 
 template <class P>
@@ -58,24 +72,11 @@ void update_blocks(const NodeArguments<P>& a, std::uint32_t first, std::uint32_t
   using N = Node<P>;
   for (std::size_t n = std::size_t{first} * kBlockNodes; n < std::size_t{last} * kBlockNodes; ++n) {
     typename P::Real* sums = a.sums + n * kChannels;
-    typename P::Real* velocities = a.velocities + n * kChannels;
     const typename P::Real mass = sums[kMass];
-    if (!(mass > a.smallest_mass)) {
-      N{}.store(velocities);
-      N{}.store(sums);
-      continue;
-    }
-    // Momentum and force per mass are velocity and acceleration.
-    const N per_mass = N::load(sums) * N(typename P::Real(1) / mass);
-    typename P::Real v[kChannels];
-    per_mass.store(v);
-    for (int axis = 0; axis < 3; ++axis) {
-      velocities[kNewVelocity + axis] = v[kMomentum + axis] + a.kick * v[kForce + axis];
-      velocities[kOldVelocity + axis] = v[kMomentum + axis];
-    }
-    velocities[kMass] = mass;
-    velocities[kMass + 1] = typename P::Real(0);
+    const N values = N::load(sums);
     N{}.store(sums);
+    const N velocities = mass > a.smallest_mass ? node_velocities<P>(values, mass, a.kick) : N{};
+    velocities.store(a.velocities + n * kChannels);
   }
 }
 

@@ -131,7 +131,9 @@ BRECCIA_HD void grow_damage(const PassArguments<P>& a, std::size_t i, typename P
   using Real = typename P::Real;
   using T = typename P::RealPack;
   Flaws<P>& f = a.flaws[i];
-  activate_flaws(a, f, material::principal_strain(s));
+  // Rounding must not hide a flaw that is just reached, hence the small share.
+  const T bound = material::principal_strain_bound(s) * T(Real(1.0001));
+  if (any(bound > f.next_threshold)) activate_flaws(a, f, material::principal_strain(s));
   const T active = convert<Real>(f.count & typename P::IntPack(0xffff));
   const auto growing = (active > T(Real(0))) & (s.damage_root < T(Real(1)));
   if (!any(growing)) return;

@@ -1,5 +1,4 @@
-// Quadratic B-spline weights of a pack of particles and the two transfers of one lane, with node channels in lanes.
-// Separable: a gather contracts z, y, x; a scatter expands x, y, z (cpu_limit.md 2).
+// Quadratic B-spline weights of a pack of particles.
 #pragma once
 
 #include "grid/tile.hpp"
@@ -19,102 +18,123 @@ BRECCIA_HD Pack<std::int32_t, W> stencil_start(Pack<std::int32_t, W> node, int a
   return ((node >> (8 * axis)) & I(255)) - I(kNodeBias - 1);
 }
 
-/// Weights w_k and first moments w_k r_k, r_k = (x_node - x_p)/dx, of three nodes along three axes.
+/// Two nodes that follow each other along z fill a register: transfers take nodes by pairs (transfer_pairs.hpp).
+template <class P>
+inline constexpr bool kNodePairs = static_cast<int>(sizeof(typename P::Real)) * 2 * kChannels == kRegisterBytes;
+
+/// Weights w_k of three nodes along an axis. First moments are taken about the nearest node, sum w_k (k - 1) n_k, which
+/// needs no weights of its own; `offset` turns them into moments about the particle. Where nodes are taken by pairs
+/// there are four along z, one of them with weight 0, so that the first is even; their moments are tabulated.
 template <class P>
 struct Stencil {
   using Real = typename P::Real;
-  alignas(64) Real weight[3][3][P::kLanes];
-  alignas(64) Real moment[3][3][P::kLanes];
-  alignas(64) std::int32_t start[P::kLanes];  ///< index of the first node in the tile
+  using T = typename P::RealPack;
+  static constexpr int kAlongZ = kNodePairs<P> ? 4 : 3;
 
-  /// Sets the stencil of all lanes; returns the mask of lanes outside the margin, whose start is made harmless.
-  BRECCIA_HD typename P::IntPack::Mask set(const Kinematics<P>& k) {
-    using T = typename P::RealPack;
+  T offset[3];                               ///< of the particle from its nearest node [cells]
+  alignas(64) Real weight[2][3][P::kLanes];  ///< x and y
+  alignas(64) Real weight_z[kAlongZ][P::kLanes];
+  alignas(64) Real moment_z[kAlongZ][P::kLanes];  ///< only for pairs
+  alignas(64) std::int32_t start[P::kLanes];      ///< index of the first node in the tile
+
+  /// First node along each axis of every lane.
+  struct Place {
+    typename P::IntPack axis[3];
+  };
+
+  /// Sets the stencil of all lanes. The start of those outside the margin is made harmless.
+  BRECCIA_HD Place set(const Kinematics<P>& k) {
     using I = typename P::IntPack;
-    const T half(Real(0.5));
-    const T one(Real(1));
-    for (int axis = 0; axis < 3; ++axis) {
-      const T d = offset_in_cells(k.offset[axis]);
-      const T lower = half - d;
-      const T upper = half + d;
-      const T w[3] = {half * lower * lower, T(Real(0.75)) - d * d, half * upper * upper};
-      const T r[3] = {-one - d, -d, one - d};
-      for (int i = 0; i < 3; ++i) {
-        w[i].store(weight[axis][i]);
-        (w[i] * r[i]).store(moment[axis][i]);
-      }
-    }
     const I x = stencil_start(k.node, 0);
     const I y = stencil_start(k.node, 1);
     const I z = stencil_start(k.node, 2);
-    const I low = min(min(x, y), z);
-    const I high = max(max(x, y), z);
-    const auto outside = (low < I(0)) | (high > I(kTileWidth - 3));
-    const I index = (x * I(kTileWidth) + y) * I(kTileWidth) + z;
-    select(outside, I(0), index).store(start);
-    return outside;
-  }
-};
-
-/// sum w n and sum w r n along x, y, z over the 27 nodes of one lane.
-template <class P>
-struct Gathered {
-  Node<P> value, x, y, z;
-};
-
-template <class P>
-BRECCIA_HD Gathered<P> gather_lane(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
-  using N = Node<P>;
-  const typename P::Real* origin = nodes + s.start[lane] * kChannels;
-  const N wz[3] = {N(s.weight[2][0][lane]), N(s.weight[2][1][lane]), N(s.weight[2][2][lane])};
-  const N mz[3] = {N(s.moment[2][0][lane]), N(s.moment[2][1][lane]), N(s.moment[2][2][lane])};
-  Gathered<P> g{N{}, N{}, N{}, N{}};
-  for (int i = 0; i < 3; ++i) {
-    N plane{}, plane_y{}, plane_z{};
-    for (int j = 0; j < 3; ++j) {
-      const typename P::Real* row = origin + (i * kTileWidth + j) * kTileWidth * kChannels;
-      const N n0 = N::load(row);
-      const N n1 = N::load(row + kChannels);
-      const N n2 = N::load(row + 2 * kChannels);
-      const N line = wz[0] * n0 + wz[1] * n1 + wz[2] * n2;
-      const N line_z = mz[0] * n0 + mz[1] * n1 + mz[2] * n2;
-      const N wy(s.weight[1][j][lane]);
-      plane += wy * line;
-      plane_y += N(s.moment[1][j][lane]) * line;
-      plane_z += wy * line_z;
+    for (int axis = 0; axis < 3; ++axis) offset[axis] = offset_in_cells(k.offset[axis]);
+    store(Weights(offset[0]), weight[0]);
+    store(Weights(offset[1]), weight[1]);
+    if constexpr (kNodePairs<P>) {
+      store_pairs(Weights(offset[2]), (z & I(1)) == I(1));
+    } else {
+      store(Weights(offset[2]), weight_z);
     }
-    const N wx(s.weight[0][i][lane]);
-    g.value += wx * plane;
-    g.x += N(s.moment[0][i][lane]) * plane;
-    g.y += wx * plane_y;
-    g.z += wx * plane_z;
+    const I first = kNodePairs<P> ? z & I(~1) : z;
+    select(outside({x, y, z}), I(0), x * I(kTilePlane) + y * I(kTileWidth) + first).store(start);
+    return {x, y, z};
   }
-  return g;
-}
 
-/// Adds w (value + x r_x + y r_y + z r_z) to the 27 nodes of one lane.
+  /// Lanes whose stencil reaches beyond the tile.
+  BRECCIA_HD static typename P::IntPack::Mask outside(const Place& place) {
+    using I = typename P::IntPack;
+    const I low = min(min(place.axis[0], place.axis[1]), place.axis[2]);
+    const I high = max(max(place.axis[0], place.axis[1]), place.axis[2]);
+    return (low < I(0)) | (high > I(kTileWidth - 3));
+  }
+
+ private:
+  struct Weights {
+    T node[3];
+    BRECCIA_HD explicit Weights(T d) {
+      const T half(Real(0.5));
+      const T lower = half - d;
+      const T upper = half + d;
+      node[0] = half * lower * lower;
+      node[1] = T(Real(0.75)) - d * d;
+      node[2] = half * upper * upper;
+    }
+  };
+
+  BRECCIA_HD static void store(const Weights& w, Real (&to)[3][P::kLanes]) {
+    for (int i = 0; i < 3; ++i) w.node[i].store(to[i]);
+  }
+
+  BRECCIA_HD void store_pairs(const Weights& w, typename T::Mask odd) {
+    const T zero(Real(0));
+    select(odd, zero, w.node[0]).store(weight_z[0]);
+    select(odd, w.node[0], w.node[1]).store(weight_z[1]);
+    select(odd, w.node[1], w.node[2]).store(weight_z[2]);
+    select(odd, w.node[2], zero).store(weight_z[3]);
+    select(odd, zero, -w.node[0]).store(moment_z[0]);
+    select(odd, -w.node[0], zero).store(moment_z[1]);
+    select(odd, zero, w.node[2]).store(moment_z[2]);
+    select(odd, w.node[2], zero).store(moment_z[3]);
+  }
+};
+
+/// Grows over the stencils of the packs of a tile.
 template <class P>
-BRECCIA_HD void scatter_lane(typename P::Real* nodes, const Stencil<P>& s, int lane, const Gathered<P>& q) {
-  using N = Node<P>;
-  typename P::Real* origin = nodes + s.start[lane] * kChannels;
-  const N wz[3] = {N(s.weight[2][0][lane]), N(s.weight[2][1][lane]), N(s.weight[2][2][lane])};
-  const N mz[3] = {N(s.moment[2][0][lane]), N(s.moment[2][1][lane]), N(s.moment[2][2][lane])};
-  for (int i = 0; i < 3; ++i) {
-    const N wx(s.weight[0][i][lane]);
-    const N plane = wx * q.value + N(s.moment[0][i][lane]) * q.x;
-    const N plane_y = wx * q.y;
-    const N plane_z = wx * q.z;
-    for (int j = 0; j < 3; ++j) {
-      const N wy(s.weight[1][j][lane]);
-      const N line = wy * plane + N(s.moment[1][j][lane]) * plane_y;
-      const N line_z = wy * plane_z;
-      typename P::Real* row = origin + (i * kTileWidth + j) * kTileWidth * kChannels;
-      for (int k = 0; k < 3; ++k) {
-        typename P::Real* node = row + k * kChannels;
-        (N::load(node) + (wz[k] * line + mz[k] * line_z)).store(node);
+class BoxOfStencils {
+  using I = typename P::IntPack;
+
+ public:
+  BRECCIA_HD BoxOfStencils() : low_{I(kTileWidth), I(kTileWidth), I(kTileWidth)}, high_{I(-1), I(-1), I(-1)} {}
+
+  /// Empty lanes have mass 0 and do not count.
+  BRECCIA_HD void add(const typename Stencil<P>::Place& place, typename P::RealPack mass) {
+    const auto there = convert<std::int32_t>(select(mass > typename P::RealPack(0), typename P::RealPack(1),
+                                                    typename P::RealPack(0))) > I(0);
+    for (int axis = 0; axis < 3; ++axis) {
+      low_[axis] = select(there, min(low_[axis], place.axis[axis]), low_[axis]);
+      high_[axis] = select(there, max(high_[axis], place.axis[axis]), high_[axis]);
+    }
+  }
+
+  /// Inside the tile whatever strayed.
+  [[nodiscard]] BRECCIA_HD TileBox box() const {
+    TileBox b;
+    for (int axis = 0; axis < 3; ++axis) {
+      int low = kTileWidth - 3;
+      int high = 0;
+      for (int l = 0; l < P::kLanes; ++l) {
+        low = low_[axis][l] < low ? low_[axis][l] : low;
+        high = high_[axis][l] > high ? high_[axis][l] : high;
       }
+      b.low[axis] = static_cast<std::int8_t>(low < 0 ? 0 : low);
+      b.high[axis] = static_cast<std::int8_t>((high > kTileWidth - 3 ? kTileWidth - 3 : high) + 2);
     }
+    return b;
   }
-}
+
+ private:
+  I low_[3], high_[3];
+};
 
 }  // namespace breccia::grid

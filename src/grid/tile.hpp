@@ -13,7 +13,13 @@ inline constexpr int kBlockWidth = 4;  ///< nodes along an edge of a block
 inline constexpr int kBlockNodes = 64;
 inline constexpr int kTileMargin = 2;  ///< stencil (1) and drift between two sortings (1)
 inline constexpr int kTileWidth = kBlockWidth + 2 * kTileMargin;
-inline constexpr int kTileNodes = kTileWidth * kTileWidth * kTileWidth;
+/// Nodes from one plane x = const of a tile to the next: two more than it holds, since rows that lie 4096 bytes apart
+/// make loads wait for stores they have nothing to do with.
+inline constexpr int kTilePlane = kTileWidth * kTileWidth + 2;
+inline constexpr int kTileNodes = kTileWidth * kTilePlane;
+
+/// Index of a node in a tile, coordinates 0 .. 7.
+constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTileWidth + z; }
 inline constexpr int kNodeBias = 8;  ///< keeps the 8-bit tile coordinates positive
 inline constexpr std::uint32_t kNoBlock = 0xffffffffU;
 
@@ -31,6 +37,14 @@ struct Tile {
   std::uint32_t particles = 0;
   std::uint32_t neighbours[27];  ///< block indices, x slowest; kNoBlock where it reaches no node
 };
+
+/// The nodes that the particles of a tile touched in their last scatter, first and last of each axis.
+struct TileBox {
+  std::int8_t low[3];
+  std::int8_t high[3];
+};
+
+inline constexpr TileBox kWholeTile{{0, 0, 0}, {kTileWidth - 1, kTileWidth - 1, kTileWidth - 1}};
 
 /// What a pass over a tile found.
 struct TileReport {
@@ -53,6 +67,7 @@ struct PassArguments {
   using Real = typename P::Real;
 
   const Tile* tiles = nullptr;
+  TileBox* boxes = nullptr;  ///< written by a scatter, read by the gather after it
   Kinematics<P>* kinematics = nullptr;
   Volume<P>* volume = nullptr;
   Elastic<P>* elastic = nullptr;
@@ -85,6 +100,7 @@ template <class P>
 struct ProbeArguments {
   using Real = typename P::Real;
   const Tile* tiles = nullptr;
+  const TileBox* boxes = nullptr;
   const Kinematics<P>* kinematics = nullptr;
   const Real* velocities = nullptr;
   TransferParameters transfer;

@@ -1,4 +1,5 @@
-// Copies between blocks and the 8x8x8 nodes of a tile that stay in the first-level cache.
+// Copies between blocks and the 8x8x8 nodes of a tile that stay in the first-level cache. Only the box that particles
+// touch is copied, along z by pairs of nodes: a pair is a cache line in mixed precision and never crosses blocks.
 #pragma once
 
 #include "grid/tile.hpp"
@@ -7,71 +8,99 @@ namespace breccia::grid {
 
 namespace detail {
 
-// The stretches of nodes along an axis that a tile shares with the blocks below, at and above its own.
-inline constexpr int kLength[3] = {kTileMargin, kBlockWidth, kTileMargin};
-inline constexpr int kBlockStart[3] = {kBlockWidth - kTileMargin, 0, 0};
-inline constexpr int kTileStart[3] = {0, kTileMargin, kTileMargin + kBlockWidth};
+inline constexpr int kPairs = kTileWidth / 2;
+/// Which of the three blocks along z holds a pair of tile nodes, and where in it.
+inline constexpr int kPairBlock[kPairs] = {0, 1, 1, 2};
+inline constexpr int kPairStart[kPairs] = {kBlockWidth - kTileMargin, 0, 2, 0};
+static_assert(kTileMargin == 2 && kBlockWidth == 4, "the tables above hold for these");
 
-// Calls run.operator()<nodes>(block, first node in the block, first node in the tile) for the runs along z of a tile.
-// Lengths are compile-time constants: copies of two and four nodes without branches overlap their cache misses.
+/// Coordinates of a tile node along an axis: block below, own or above, and node inside it.
+constexpr int block_of_node(int n) { return (n + kBlockWidth - kTileMargin) / kBlockWidth; }
+constexpr int node_in_block(int n) { return (n + kBlockWidth - kTileMargin) % kBlockWidth; }
+
+// Calls row(blocks along z, first node of the row in a block, first node in the tile) for the rows of a box.
 template <class F>
-BRECCIA_HD void for_each_run(const Tile& tile, F&& run) {
-  for (int bx = 0; bx < 3; ++bx) {
-    for (int by = 0; by < 3; ++by) {
-      const std::uint32_t* blocks = tile.neighbours + (bx * 3 + by) * 3;
-      for (int x = 0; x < kLength[bx]; ++x) {
-        for (int y = 0; y < kLength[by]; ++y) {
-          const int in_block = ((kBlockStart[bx] + x) * kBlockWidth + kBlockStart[by] + y) * kBlockWidth;
-          const int in_tile = ((kTileStart[bx] + x) * kTileWidth + kTileStart[by] + y) * kTileWidth;
-          run.template operator()<kLength[0]>(blocks[0], in_block + kBlockStart[0], in_tile + kTileStart[0]);
-          run.template operator()<kLength[1]>(blocks[1], in_block + kBlockStart[1], in_tile + kTileStart[1]);
-          run.template operator()<kLength[2]>(blocks[2], in_block + kBlockStart[2], in_tile + kTileStart[2]);
-        }
-      }
+BRECCIA_HD void for_each_row(const Tile& tile, const TileBox& box, F&& row) {
+  for (int x = box.low[0]; x <= box.high[0]; ++x) {
+    for (int y = box.low[1]; y <= box.high[1]; ++y) {
+      row(tile.neighbours + (block_of_node(x) * 3 + block_of_node(y)) * 3,
+          (node_in_block(x) * kBlockWidth + node_in_block(y)) * kBlockWidth, tile_index(x, y, 0));
     }
   }
 }
 
-}  // namespace detail
-
-/// Tile nodes from blocks; nodes of blocks it does not reach become zero.
-template <class P>
-BRECCIA_HD void load_tile(const Tile& tile, const typename P::Real* blocks, typename P::Real* nodes) {
-  using N = Node<P>;
-  detail::for_each_run(tile, [&]<int kNodes>(std::uint32_t block, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
-    typename P::Real* to = nodes + in_tile * kChannels;
-    if (block == kNoBlock) {
-      for (int i = 0; i < kNodes; ++i) N{}.store(to + i * kChannels);
-      return;
+// Calls pair(block, node in it, node in the tile) for the pairs of a box.
+template <class F>
+BRECCIA_HD void for_each_pair(const Tile& tile, const TileBox& box, F&& pair) {
+  const int first = box.low[2] / 2;
+  const int last = box.high[2] / 2;
+  const bool all = first == 0 && last == kPairs - 1;
+  for_each_row(tile, box, [&](const std::uint32_t* blocks, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
+    if (all) {
+      // Unrolled, so that the cache misses of a row overlap.
+      for (int p = 0; p < kPairs; ++p) pair(blocks[kPairBlock[p]], in_block + kPairStart[p], in_tile + 2 * p);
+    } else {
+      for (int p = first; p <= last; ++p) pair(blocks[kPairBlock[p]], in_block + kPairStart[p], in_tile + 2 * p);
     }
-    const typename P::Real* from =
-        blocks + (std::size_t{block} * kBlockNodes + static_cast<std::size_t>(in_block)) * kChannels;
-    for (int i = 0; i < kNodes; ++i) N::load(from + i * kChannels).store(to + i * kChannels);
   });
 }
 
-/// Adds tile nodes to their blocks. Returns true if mass has reached a block that no particle of the tile could reach
-/// at the last sorting: a particle has drifted more than the margin allows.
 template <class P>
-[[nodiscard]] BRECCIA_HD bool add_tile(const Tile& tile, const typename P::Real* nodes, typename P::Real* blocks) {
-  using N = Node<P>;
+using TwoNodes = Pack<typename P::Real, 2 * kChannels>;
+
+constexpr std::size_t at(std::uint32_t block, int node) {
+  return (std::size_t{block} * kBlockNodes + static_cast<std::size_t>(node)) * kChannels;
+}
+
+}  // namespace detail
+
+/// The nodes of the box from the blocks. A box reaches only blocks that the tile knows.
+template <class P>
+BRECCIA_HD void load_tile(const Tile& tile, const TileBox& box, const typename P::Real* blocks,
+                          typename P::Real* nodes) {
+  using N = detail::TwoNodes<P>;
+  detail::for_each_pair(tile, box, [&](std::uint32_t block, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
+    // Where a box ends inside a pair, the other node may belong to a block that no particle reaches.
+    const N value = block == kNoBlock ? N(typename P::Real(0)) : N::load(blocks + detail::at(block, in_block));
+    value.store(nodes + in_tile * kChannels);
+  });
+}
+
+/// Adds the nodes of the box to their blocks. Returns true if mass has reached a block that no particle of the tile
+/// could reach at the last sorting: a particle has drifted more than the margin allows.
+template <class P>
+[[nodiscard]] BRECCIA_HD bool add_tile(const Tile& tile, const TileBox& box, const typename P::Real* nodes,
+                                       typename P::Real* blocks) {
+  using N = detail::TwoNodes<P>;
   bool lost = false;
-  detail::for_each_run(tile, [&]<int kNodes>(std::uint32_t block, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
+  detail::for_each_pair(tile, box, [&](std::uint32_t block, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
     const typename P::Real* from = nodes + in_tile * kChannels;
     if (block == kNoBlock) {
-      for (int i = 0; i < kNodes; ++i) lost = lost || from[i * kChannels + kMass] != typename P::Real(0);
+      lost = lost || from[kMass] != typename P::Real(0) || from[kChannels + kMass] != typename P::Real(0);
       return;
     }
-    typename P::Real* to = blocks + (std::size_t{block} * kBlockNodes + static_cast<std::size_t>(in_block)) * kChannels;
-    for (int i = 0; i < kNodes; ++i)
-      (N::load(to + i * kChannels) + N::load(from + i * kChannels)).store(to + i * kChannels);
+    typename P::Real* to = blocks + detail::at(block, in_block);
+    (N::load(to) + N::load(from)).store(to);
   });
   return lost;
 }
 
+/// Zeroes the nodes that the particles of a tile can reach in one step from those of `box`.
 template <class P>
-BRECCIA_HD void clear_tile(typename P::Real* nodes) {
-  for (int i = 0; i < kTileNodes; ++i) Node<P>{}.store(nodes + i * kChannels);
+BRECCIA_HD void clear_tile(const TileBox& box, typename P::Real* nodes) {
+  using N = detail::TwoNodes<P>;
+  TileBox wider;
+  for (int axis = 0; axis < 3; ++axis) {
+    wider.low[axis] = static_cast<std::int8_t>(box.low[axis] > 0 ? box.low[axis] - 1 : 0);
+    wider.high[axis] = static_cast<std::int8_t>(box.high[axis] < kTileWidth - 1 ? box.high[axis] + 1 : kTileWidth - 1);
+  }
+  for (int x = wider.low[0]; x <= wider.high[0]; ++x) {
+    for (int y = wider.low[1]; y <= wider.high[1]; ++y) {
+      for (int z = wider.low[2] & ~1; z <= wider.high[2]; z += 2) {
+        N(typename P::Real(0)).store(nodes + tile_index(x, y, z) * kChannels);
+      }
+    }
+  }
 }
 
 }  // namespace breccia::grid

@@ -4,7 +4,7 @@
 
 #include "grid/particle_pack.hpp"
 #include "grid/tile_nodes.hpp"
-#include "grid/transpose.hpp"
+#include "grid/transfer.hpp"
 
 namespace breccia::grid {
 
@@ -25,15 +25,19 @@ class TilePass {
   BRECCIA_HD TilePass(const PassArguments<P>& arguments, const Fx& effects, TileScratch<P>& scratch)
       : a_(arguments), fx_(effects), scratch_(scratch) {}
 
-  BRECCIA_HD void run(const Tile& tile, TileReport& report) {
-    if (a_.gather) load_tile<P>(tile, a_.velocities, scratch_.velocities);
-    if (a_.scatter) clear_tile<P>(scratch_.sums);
+  BRECCIA_HD void run(std::uint32_t index, TileReport& report) {
+    const Tile& tile = a_.tiles[index];
+    if (a_.gather) load_tile<P>(tile, a_.boxes[index], a_.velocities, scratch_.velocities);
+    if (a_.scatter) clear_tile<P>(a_.gather ? a_.boxes[index] : kWholeTile, scratch_.sums);
     const int packs = (static_cast<int>(tile.particles) + kLanes - 1) / kLanes;
     for (int p = 0; p < packs; ++p) {
       const int left = static_cast<int>(tile.particles) - p * kLanes;
       run_pack(tile.first_pack + static_cast<std::size_t>(p), left < kLanes ? left : kLanes, report);
     }
-    if (a_.scatter && add_tile<P>(tile, scratch_.sums, a_.sums)) ++report.strayed;
+    if (a_.scatter) {
+      a_.boxes[index] = touched_.box();
+      if (add_tile<P>(tile, a_.boxes[index], scratch_.sums, a_.sums)) ++report.strayed;
+    }
   }
 
  private:
@@ -43,7 +47,7 @@ class TilePass {
     Mat3<T> gradient;
     if (a_.gather) {
       stencil_.set(k);
-      const GridVelocity<P> grid = gather(lanes);
+      const GridVelocity<P> grid = gather_velocity(lanes);
       gradient = grid.gradient;
       const Real moved = horizontal_max(advance(a_, k, grid));
       if (moved > report.largest_move) report.largest_move = moved;
@@ -57,8 +61,9 @@ class TilePass {
       gradient = load_gradient(i);
     }
     if (a_.scatter) {
-      const auto outside = stencil_.set(k);
-      if (any(outside)) ++report.strayed;
+      const auto place = stencil_.set(k);
+      if (any(Stencil<P>::outside(place))) ++report.strayed;
+      touched_.add(place, k.mass);
       material::Dissipation<T> lost{};
       Sym3<T> tau{};
       for_each_material(i, state, [&](const material::Constants<Real>& c, material::State<T>& s) BRECCIA_INLINE_LAMBDA {
@@ -67,32 +72,18 @@ class TilePass {
       const T volume = reference_volume(i, k.mass);
       report.plastic_work += static_cast<double>(horizontal_sum(volume * lost.plastic));
       report.viscous_work += static_cast<double>(horizontal_sum(volume * lost.viscous));
-      scatter(i, lanes, k, gradient, volume, tau);
+      spread(i, lanes, k, gradient, volume, tau);
     }
     store_state(a_, fx_, i, state);
   }
 
-  BRECCIA_HD GridVelocity<P> gather(int lanes) {
-    Node<P> value[kLanes];
-    Node<P> xy[kLanes];
-    Node<P> z[kLanes];
-    for (int l = 0; l < lanes; ++l) {
-      const Gathered<P> g = gather_lane<P>(scratch_.velocities, stencil_, l);
-      value[l] = g.value;
-      xy[l] = join(lower(g.x), lower(g.y));
-      z[l] = g.z;
-    }
-    for (int l = lanes; l < kLanes; ++l) value[l] = xy[l] = z[l] = Node<P>{};
-    T v[8];
-    T gxy[8];
-    T gz[8];
-    rows_to_channels(value, v);
-    rows_to_channels(xy, gxy);
-    rows_to_channels(z, gz);
+  BRECCIA_HD GridVelocity<P> gather_velocity(int lanes) {
+    const GatheredVelocity<P> g = gather<P>(scratch_.velocities, stencil_, lanes);
     const T c(Real(4) / a_.cell);  // (4 / dx^2) * dx, moments being in cells
-    return {{v[0], v[1], v[2]},
-            {v[3], v[4], v[5]},
-            {c * gxy[0], c * gxy[4], c * gz[0], c * gxy[1], c * gxy[5], c * gz[1], c * gxy[2], c * gxy[6], c * gz[2]}};
+    return {{g.value[0], g.value[1], g.value[2]},
+            {g.value[3], g.value[4], g.value[5]},
+            {c * g.by_x[0], c * g.by_y[0], c * g.by_z[0], c * g.by_x[1], c * g.by_y[1], c * g.by_z[1], c * g.by_x[2],
+             c * g.by_y[2], c * g.by_z[2]}};
   }
 
   BRECCIA_HD void stress(const material::Constants<Real>& c, material::State<T>& s, const Mat3<T>& gradient,
@@ -111,38 +102,22 @@ class TilePass {
   }
 
   // The momentum and force polynomials of each lane: value + gradient * (x_i - x_p).
-  BRECCIA_HD void scatter(std::size_t i, int lanes, const Kinematics<P>& k, const Mat3<T>& c, T volume,
-                          const Sym3<T>& tau) {
-    const T zero(Real(0));
-    const T spread = a_.transfer.affine ? k.mass * T(a_.cell) : zero;
+  BRECCIA_HD void spread(std::size_t i, int lanes, const Kinematics<P>& k, const Mat3<T>& c, T volume,
+                         const Sym3<T>& tau) {
+    const T affine = a_.transfer.affine ? k.mass * T(a_.cell) : T(Real(0));
     const T pull = T(Real(-4) / a_.cell) * volume;
     Vec3<T> g{T(a_.uniform_gravity.x), T(a_.uniform_gravity.y), T(a_.uniform_gravity.z)};
     if (a_.gravity != nullptr) {
       const T* held = a_.gravity[i].acceleration;
       g = g + Vec3<T>{held[0], held[1], held[2]};
     }
-    const T value[8] = {k.mass * k.velocity[0],
-                        k.mass * k.velocity[1],
-                        k.mass * k.velocity[2],
-                        k.mass * g.x,
-                        k.mass * g.y,
-                        k.mass * g.z,
-                        k.mass,
-                        zero};
-    const T x[8] = {spread * c.xx, spread * c.yx, spread * c.zx, pull * tau.xx,
-                    pull * tau.xy, pull * tau.xz, zero,          zero};
-    const T y[8] = {spread * c.xy, spread * c.yy, spread * c.zy, pull * tau.xy,
-                    pull * tau.yy, pull * tau.yz, zero,          zero};
-    const T z[8] = {spread * c.xz, spread * c.yz, spread * c.zz, pull * tau.xz,
-                    pull * tau.yz, pull * tau.zz, zero,          zero};
-    Node<P> rows[4][kLanes];
-    channels_to_rows(value, rows[0]);
-    channels_to_rows(x, rows[1]);
-    channels_to_rows(y, rows[2]);
-    channels_to_rows(z, rows[3]);
-    for (int l = 0; l < lanes; ++l) {
-      scatter_lane<P>(scratch_.sums, stencil_, l, {rows[0][l], rows[1][l], rows[2][l], rows[3][l]});
-    }
+    const SpreadMomentum<P> q = {
+        {k.mass * k.velocity[0], k.mass * k.velocity[1], k.mass * k.velocity[2], k.mass * g.x, k.mass * g.y,
+         k.mass * g.z, k.mass},
+        {affine * c.xx, affine * c.yx, affine * c.zx, pull * tau.xx, pull * tau.xy, pull * tau.xz},
+        {affine * c.xy, affine * c.yy, affine * c.zy, pull * tau.xy, pull * tau.yy, pull * tau.yz},
+        {affine * c.xz, affine * c.yz, affine * c.zz, pull * tau.xz, pull * tau.yz, pull * tau.zz}};
+    scatter<P>(scratch_.sums, stencil_, lanes, q);
   }
 
   // Calls update(constants, state) once for each material present in the pack and keeps each lane's own result.
@@ -192,6 +167,7 @@ class TilePass {
   const Fx& fx_;
   TileScratch<P>& scratch_;
   Stencil<P> stencil_;
+  BoxOfStencils<P> touched_;
 };
 
 }  // namespace breccia::grid

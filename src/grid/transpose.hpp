@@ -28,6 +28,16 @@ BRECCIA_HD void transpose8_in_registers(Pack<S, 8> (&row)[8]) {
   }
 }
 
+// Quarters 0 and 2 (1 and 3) of two rows of 16 lanes.
+template <class V>
+BRECCIA_HD V even_quarters(V a, V b) {
+  return __builtin_shufflevector(a, b, 0, 1, 2, 3, 8, 9, 10, 11, 16, 17, 18, 19, 24, 25, 26, 27);
+}
+template <class V>
+BRECCIA_HD V odd_quarters(V a, V b) {
+  return __builtin_shufflevector(a, b, 4, 5, 6, 7, 12, 13, 14, 15, 20, 21, 22, 23, 28, 29, 30, 31);
+}
+
 // Registers too narrow for a row: the caches do it.
 template <class S>
 BRECCIA_HD void transpose8_in_memory(Pack<S, 8> (&row)[8]) {
@@ -50,6 +60,57 @@ BRECCIA_HD void transpose8(Pack<S, 8> (&row)[8]) {
   } else {
     detail::transpose8_in_registers(row);
   }
+}
+
+/// Transposes 16 rows of 16 lanes in place; for registers that hold a row.
+template <class S>
+BRECCIA_HD void transpose16(Pack<S, 16> (&row)[16]) {
+  Pack<S, 16> a[16];
+  Pack<S, 16> b[16];
+  for (int i = 0; i < 16; i += 2) {
+    const auto r0 = row[i].v;
+    const auto r1 = row[i + 1].v;
+    a[i] = __builtin_shufflevector(r0, r1, 0, 16, 1, 17, 4, 20, 5, 21, 8, 24, 9, 25, 12, 28, 13, 29);
+    a[i + 1] = __builtin_shufflevector(r0, r1, 2, 18, 3, 19, 6, 22, 7, 23, 10, 26, 11, 27, 14, 30, 15, 31);
+  }
+  for (int i = 0; i < 16; i += 4) {
+    for (int j = 0; j < 2; ++j) {
+      const auto r0 = a[i + j].v;
+      const auto r1 = a[i + j + 2].v;
+      b[i + 2 * j] = __builtin_shufflevector(r0, r1, 0, 1, 16, 17, 4, 5, 20, 21, 8, 9, 24, 25, 12, 13, 28, 29);
+      b[i + 2 * j + 1] = __builtin_shufflevector(r0, r1, 2, 3, 18, 19, 6, 7, 22, 23, 10, 11, 26, 27, 14, 15, 30, 31);
+    }
+  }
+  // Now quarter q of b[4 k + j] holds column 4 q + j of the rows 4 k .. 4 k + 3.
+  for (int j = 0; j < 4; ++j) {
+    const auto even_low = detail::even_quarters(b[j].v, b[4 + j].v);
+    const auto odd_low = detail::odd_quarters(b[j].v, b[4 + j].v);
+    const auto even_high = detail::even_quarters(b[8 + j].v, b[12 + j].v);
+    const auto odd_high = detail::odd_quarters(b[8 + j].v, b[12 + j].v);
+    row[j] = detail::even_quarters(even_low, even_high);
+    row[4 + j] = detail::even_quarters(odd_low, odd_high);
+    row[8 + j] = detail::odd_quarters(even_low, even_high);
+    row[12 + j] = detail::odd_quarters(odd_low, odd_high);
+  }
+}
+
+/// Lower halves of a and b, plus their upper halves.
+template <class S>
+BRECCIA_HD Pack<S, 16> joined_halves(Pack<S, 16> a, Pack<S, 16> b) {
+  const Pack<S, 16> low = __builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
+  const Pack<S, 16> high =
+      __builtin_shufflevector(a.v, b.v, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
+  return low + high;
+}
+
+/// The lower (upper) half in both halves.
+template <class S>
+BRECCIA_HD Pack<S, 16> twice_lower(Pack<S, 16> a) {
+  return __builtin_shufflevector(a.v, a.v, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
+}
+template <class S>
+BRECCIA_HD Pack<S, 16> twice_upper(Pack<S, 16> a) {
+  return __builtin_shufflevector(a.v, a.v, 8, 9, 10, 11, 12, 13, 14, 15, 8, 9, 10, 11, 12, 13, 14, 15);
 }
 
 /// channels[c] gets channel c of all lanes from rows[lane]; W = 8 or 16 lanes.

@@ -20,6 +20,13 @@ BRECCIA_HD T principal_strain(const State<T>& state) {
   return T(R(0.5)) * log1p(largest_eigenvalue(state.total));
 }
 
+/// What principal_strain does not exceed: ln(1 + x) <= x.
+template <class T>
+BRECCIA_HD T principal_strain_bound(const State<T>& state) {
+  using R = scalar_of<T>;
+  return T(R(0.5)) * eigenvalue_bound(state.total);
+}
+
 /// c_g / R_s [1/s]: crack speed (a fixed share of the longitudinal wave speed) over the radius of the sphere that has
 /// the reference volume [m3] of a particle.
 inline double crack_growth_rate(const MaterialParameters& p, double particle_volume) {

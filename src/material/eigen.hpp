@@ -60,6 +60,17 @@ BRECCIA_HD SymmetricEigen<T> symmetric_eigen(Sym3<T> a) {
   return e;
 }
 
+/// A number that no eigenvalue exceeds, at most |dev a| / sqrt(6) above the largest one: without determinant and roots
+/// of the cubic.
+template <class T>
+BRECCIA_HD T eigenvalue_bound(const Sym3<T>& a) {
+  using R = scalar_of<T>;
+  const T mean = (a.xx + a.yy + a.zz) * T(R(1) / R(3));
+  const T xx = a.xx - mean, yy = a.yy - mean, zz = a.zz - mean;
+  const T half_square = T(R(0.5)) * (xx * xx + yy * yy + zz * zz) + (a.xy * a.xy + a.xz * a.xz + a.yz * a.yz);
+  return mean + T(R(2)) * sqrt(half_square * T(R(1) / R(3)));
+}
+
 /// Largest eigenvalue alone, without eigenvectors, accurate relative to |a| however small that is (a few ulp; square
 /// root of that where the two largest coincide). With the deviator scaled to unit size it is 1 + u, where
 /// u sqrt(3 + u) = 2 y and y = cos(3/2 * Lode angle): a well-conditioned form of the cubic, solved by Newton steps.
