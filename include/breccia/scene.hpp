@@ -81,7 +81,8 @@ struct NumericsParameters {
   Transfer transfer = Transfer::kAsflip;
   double asflip_alpha = 0.995;
   double asflip_beta = 1.0;
-  int sort_interval = 32;  ///< most steps between two sortings
+  int sort_interval = 32;         ///< most steps between two sortings
+  bool lone_without_grid = true;  ///< closed form for particles that share no node with another one
   LiteralSwitches literal;
 };
 

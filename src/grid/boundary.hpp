@@ -16,6 +16,8 @@ class BoundarySet {
 
   /// Axes that repeat. Throws UsageError if a periodic pair is not a multiple of 4 cells apart.
   [[nodiscard]] const Periodicity& periodicity() const { return periodicity_; }
+  /// True if there are planes other than periodic ones.
+  [[nodiscard]] bool has_walls() const { return !walls_.empty(); }
   /// Finds the nodes of these blocks that lie in or behind a wall.
   void find_nodes(std::span<const BlockKey> blocks);
   /// Applies the walls to v^{n+1/2} of the found nodes. `velocities` as in tile.hpp.

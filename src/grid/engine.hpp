@@ -44,6 +44,7 @@ struct SignalSpeeds {
 /// Numbers of this rank, for diagnostics and the profile.
 struct EngineStats {
   std::uint64_t particles = 0;
+  std::uint64_t lone_particles = 0;  ///< that use no grid
   std::uint64_t tiles = 0;
   std::uint64_t blocks = 0;
   std::uint64_t halo_bytes_per_step = 0;

@@ -71,6 +71,9 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
   a.gravity = setup_.self_gravity ? store_.gravity.data() : nullptr;
   a.identity = store_.identity.data();
   a.affine = store_.affine.data();
+  a.lone = lone_;
+  a.lone_pull = lone_pull_.data();
+  a.kick = static_cast<Real>(kick_);
   a.velocities = velocities_.data();
   a.sums = sums_.data();
   a.flaw_thresholds = flaw_thresholds_.data();
@@ -88,21 +91,33 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
 
 template <class P>
 void HostEngine<P>::run_pass(const PassArguments<P>& arguments) {
+  constexpr std::uint32_t kChunk = 16;
+  const auto lone_packs = static_cast<std::uint32_t>(lone_pull_.size());
   std::vector<TileReport> reports(tiles_.size());
+  std::vector<TileReport> lone_reports((lone_packs + kChunk - 1) / kChunk);
 #pragma omp parallel num_threads(setup_.threads)
-  for (const std::vector<TilePlane>& planes : planes_of_colour_) {
+  {
+#pragma omp for schedule(static) nowait
+    for (std::size_t n = 0; n < lone_reports.size(); ++n) {
+      const auto first = static_cast<std::uint32_t>(n) * kChunk;
+      kernels_.lone_pass(arguments, first, std::min(first + kChunk, lone_packs), lone_reports[n]);
+    }
+    for (const std::vector<TilePlane>& planes : planes_of_colour_) {
 #pragma omp for schedule(dynamic, 1)
-    for (std::size_t n = 0; n < planes.size(); ++n) {
-      for (std::uint32_t t = planes[n].first; t < planes[n].last; ++t) kernels_.pass(arguments, t, reports[t]);
+      for (std::size_t n = 0; n < planes.size(); ++n) {
+        for (std::uint32_t t = planes[n].first; t < planes[n].last; ++t) kernels_.pass(arguments, t, reports[t]);
+      }
     }
   }
   report_ = {};
-  for (const TileReport& r : reports) {
+  const auto book = [&](const TileReport& r) {
     report_.plastic_work += r.plastic_work;
     report_.viscous_work += r.viscous_work;
     report_.largest_move = std::max(report_.largest_move, r.largest_move);
     strayed_packs_ += r.strayed;
-  }
+  };
+  std::for_each(reports.begin(), reports.end(), book);
+  std::for_each(lone_reports.begin(), lone_reports.end(), book);
 }
 
 template <class P>
@@ -126,6 +141,7 @@ void HostEngine<P>::gather_scatter(double step) {
 
 template <class P>
 void HostEngine<P>::update_grid(double kick) {
+  kick_ = kick;
   halo_.add_to_owners(sums_.data(), comm_);
   NodeArguments<P> a;
   a.sums = sums_.data();
@@ -144,11 +160,11 @@ template <class P>
 void HostEngine<P>::predict(double time, std::vector<Vec3d>& position_out, std::vector<double>& mass) const {
   position_out.clear();
   mass.clear();
-  for_each_particle([&](std::size_t slot, const Tile& tile) {
+  for_each_particle([&](std::size_t slot, BlockCoord block) {
     const auto& k = store_.kinematics[slot / kLanes];
     const int lane = static_cast<int>(slot % kLanes);
     const Vec3d v{k.velocity[0][lane], k.velocity[1][lane], k.velocity[2][lane]};
-    position_out.push_back(position(slot, tile) + time * v);
+    position_out.push_back(position(slot, block) + time * v);
     mass.push_back(k.mass[lane]);
   });
 }
@@ -156,7 +172,7 @@ void HostEngine<P>::predict(double time, std::vector<Vec3d>& position_out, std::
 template <class P>
 void HostEngine<P>::hold_gravity(std::span<const Vec3d> acceleration) {
   std::size_t n = 0;
-  for_each_particle([&](std::size_t slot, const Tile&) {
+  for_each_particle([&](std::size_t slot, BlockCoord) {
     auto& held = store_.gravity[slot / kLanes].acceleration;
     const int lane = static_cast<int>(slot % kLanes);
     held[0].set(lane, static_cast<Real>(acceleration[n].x));
@@ -169,7 +185,7 @@ void HostEngine<P>::hold_gravity(std::span<const Vec3d> acceleration) {
 template <class P>
 void HostEngine<P>::kick_velocities(double time) {
   const double uniform[3] = {setup_.uniform_gravity.x, setup_.uniform_gravity.y, setup_.uniform_gravity.z};
-  for_each_particle([&](std::size_t slot, const Tile&) {
+  for_each_particle([&](std::size_t slot, BlockCoord) {
     const std::size_t pack = slot / kLanes;
     const int lane = static_cast<int>(slot % kLanes);
     for (int axis = 0; axis < 3; ++axis) {

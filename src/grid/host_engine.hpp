@@ -17,6 +17,12 @@ struct Placement {
   std::int32_t node[3];
 };
 
+/// The particles of a sorting: in tiles, and alone.
+struct SortedPlacements {
+  std::vector<Placement> tiled;
+  std::vector<Placement> lone;
+};
+
 /// Consecutive tiles whose blocks lie in one plane normal to x.
 struct TilePlane {
   std::uint32_t first, last;
@@ -49,33 +55,38 @@ class HostEngine final : public Engine {
 
  private:
   static constexpr std::size_t kLanes = P::kLanes;
+  static constexpr std::uint32_t packs_for(std::uint32_t particles) { return (particles + P::kLanes - 1) / P::kLanes; }
 
   // Passes (host_engine.cpp).
   PassArguments<P> pass_arguments(double step, double half_step);
   void run_pass(const PassArguments<P>& arguments);
 
-  // Sorting and migration (host_engine_sort.cpp, host_engine_connect.cpp, host_engine_insert.cpp).
+  // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp).
   void settle(std::vector<Placement> placements);
   [[nodiscard]] bool unbalanced(std::size_t particles) const;
   void choose_slabs(std::span<const Placement> placements);
   [[nodiscard]] int longest_axis(std::span<const Placement> placements) const;
   [[nodiscard]] std::vector<Placement> place_all() const;
   void migrate(std::vector<Placement>& placements);
-  void arrange(std::span<const Placement> placements);
+  [[nodiscard]] SortedPlacements separate(std::vector<Placement> placements);
+  [[nodiscard]] bool lone_strayed() const;  // more than a node since the last sorting
+  void arrange(const SortedPlacements& placements);
   void connect_tiles();
   void connect_halo();
   void colour_planes();
   void compact_flaws();
   [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
 
-  // Calls visit(slot, tile) for every particle, in storage order.
+  // Calls visit(slot, block) for every particle, in storage order; its node is relative to the block.
   template <class F>
   void for_each_particle(F&& visit) const {
     for (const Tile& tile : tiles_) {
-      for (std::uint32_t n = 0; n < tile.particles; ++n) visit(tile.first_pack * kLanes + n, tile);
+      const BlockCoord block = block_coord(blocks_.keys()[tile.block]);
+      for (std::uint32_t n = 0; n < tile.particles; ++n) visit(tile.first_pack * kLanes + n, block);
     }
+    for (std::uint32_t n = 0; n < lone_.particles; ++n) visit(lone_.first_pack * kLanes + n, lone_block_[n]);
   }
-  [[nodiscard]] Vec3d position(std::size_t slot, const Tile& tile) const;
+  [[nodiscard]] Vec3d position(std::size_t slot, BlockCoord block) const;
   [[nodiscard]] std::uint64_t id(std::size_t slot) const;
   [[nodiscard]] std::uint32_t material(std::size_t slot) const;
   [[nodiscard]] double hencky_norm(std::size_t slot) const;  // |dev h| of the elastic strain
@@ -94,6 +105,11 @@ class HostEngine final : public Engine {
   std::vector<Tile> tiles_;
   std::vector<TileBox> boxes_;
   std::vector<std::vector<TilePlane>> planes_of_colour_;
+  LonePacks lone_;
+  std::vector<BlockCoord> lone_block_;
+  std::vector<std::int32_t> lone_node_;  // packed node at the last sorting
+  std::vector<LonePull<P>> lone_pull_;
+  double kick_ = 0.0;  // of the last grid update [s]
   BlockTable blocks_;
   std::vector<Real> sums_;
   std::vector<Real> velocities_;

@@ -7,10 +7,9 @@
 namespace breccia::grid {
 
 template <class P>
-Vec3d HostEngine<P>::position(std::size_t slot, const Tile& tile) const {
+Vec3d HostEngine<P>::position(std::size_t slot, BlockCoord block) const {
   const Kinematics<P>& k = store_.kinematics[slot / kLanes];
   const int lane = static_cast<int>(slot % kLanes);
-  const BlockCoord block = block_coord(blocks_.keys()[tile.block]);
   double x[3];
   for (int axis = 0; axis < 3; ++axis) {
     const int node = kBlockWidth * component(block, axis) + ((k.node[lane] >> (8 * axis)) & 255) - kNodeBias;
@@ -46,12 +45,18 @@ ParticleOutput HostEngine<P>::observe() const {
   probe.transfer = transfer_;
   probe.new_velocity = new_velocity.data();
   probe.node_mass = node_mass.data();
+  probe.lone = lone_;
+  probe.gravity = setup_.self_gravity ? store_.gravity.data() : nullptr;
+  probe.uniform_gravity = {static_cast<Real>(setup_.uniform_gravity.x), static_cast<Real>(setup_.uniform_gravity.y),
+                           static_cast<Real>(setup_.uniform_gravity.z)};
+  probe.kick = static_cast<Real>(kick_);
   for (std::uint32_t t = 0; t < tiles_.size(); ++t) kernels_.probe(probe, t);
+  kernels_.lone_probe(probe);
 
   const material::RuntimeEffects& fx = setup_.effects;
   const double cell_volume = setup_.cell * setup_.cell * setup_.cell;
   ParticleOutput out;
-  for_each_particle([&](std::size_t slot, const Tile& tile) {
+  for_each_particle([&](std::size_t slot, BlockCoord block) {
     const std::size_t pack = slot / kLanes;
     const int lane = static_cast<int>(slot % kLanes);
     const Kinematics<P>& k = store_.kinematics[pack];
@@ -62,7 +67,7 @@ ParticleOutput HostEngine<P>::observe() const {
                     static_cast<double>(new_velocity[3 * slot + static_cast<std::size_t>(axis)]));
     };
     out.id.push_back(id(slot));
-    out.position.push_back(position(slot, tile));
+    out.position.push_back(position(slot, block));
     out.velocity.push_back({mean(0), mean(1), mean(2)});
     out.mass.push_back(static_cast<double>(k.mass[lane]));
     out.body.push_back(static_cast<std::uint32_t>(store_.identity[pack].body_material[lane]) & 0xffffU);
@@ -98,7 +103,7 @@ double HostEngine<P>::hencky_norm(std::size_t slot) const {
 template <class P>
 std::vector<double> HostEngine<P>::volume_ratios() const {
   std::vector<double> ratios;
-  for_each_particle([&](std::size_t slot, const Tile&) {
+  for_each_particle([&](std::size_t slot, BlockCoord) {
     ratios.push_back(1.0 +
                      static_cast<double>(store_.volume[slot / kLanes].change.value()[static_cast<int>(slot % kLanes)]));
   });
@@ -109,7 +114,7 @@ template <class P>
 double HostEngine<P>::elastic_energy() const {
   if (!setup_.effects.shear) return 0.0;
   double energy = 0.0;
-  for_each_particle([&](std::size_t slot, const Tile&) {
+  for_each_particle([&](std::size_t slot, BlockCoord) {
     const MaterialParameters& m = setup_.materials[material(slot)];
     const double norm = hencky_norm(slot);
     const double mass = static_cast<double>(store_.kinematics[slot / kLanes].mass[static_cast<int>(slot % kLanes)]);
@@ -121,25 +126,22 @@ double HostEngine<P>::elastic_energy() const {
 template <class P>
 SignalSpeeds HostEngine<P>::signal_speeds() const {
   SignalSpeeds speeds;
-  for (const Tile& tile : tiles_) {
-    for (std::uint32_t n = 0; n < tile.particles; ++n) {
-      const std::size_t pack = tile.first_pack + n / kLanes;
-      const int lane = static_cast<int>(n % kLanes);
-      const std::size_t slot = pack * kLanes + static_cast<std::size_t>(lane);
-      const auto& c = store_.affine[pack].gradient;
-      material::State<double> state{};
-      state.volume.set(static_cast<double>(store_.volume[pack].change.value()[lane]));
-      if (setup_.effects.energy) state.energy.set(static_cast<double>(store_.energy[pack].specific.value()[lane]));
-      speeds.sound = std::max(
-          speeds.sound, material::longitudinal_sound_speed(setup_.effects, double_constants_[material(slot)], state));
-      for (int axis = 0; axis < 3; ++axis) {
-        speeds.particle =
-            std::max(speeds.particle, std::abs(static_cast<double>(store_.kinematics[pack].velocity[axis][lane])));
-      }
-      speeds.compression_rate =
-          std::max(speeds.compression_rate, -static_cast<double>(c[0][lane] + c[4][lane] + c[8][lane]));
+  for_each_particle([&](std::size_t slot, BlockCoord) {
+    const std::size_t pack = slot / kLanes;
+    const int lane = static_cast<int>(slot % kLanes);
+    const auto& c = store_.affine[pack].gradient;
+    material::State<double> state{};
+    state.volume.set(static_cast<double>(store_.volume[pack].change.value()[lane]));
+    if (setup_.effects.energy) state.energy.set(static_cast<double>(store_.energy[pack].specific.value()[lane]));
+    speeds.sound = std::max(
+        speeds.sound, material::longitudinal_sound_speed(setup_.effects, double_constants_[material(slot)], state));
+    for (int axis = 0; axis < 3; ++axis) {
+      speeds.particle =
+          std::max(speeds.particle, std::abs(static_cast<double>(store_.kinematics[pack].velocity[axis][lane])));
     }
-  }
+    speeds.compression_rate =
+        std::max(speeds.compression_rate, -static_cast<double>(c[0][lane] + c[4][lane] + c[8][lane]));
+  });
   return {comm_.max(speeds.sound), comm_.max(speeds.particle), comm_.max(speeds.compression_rate)};
 }
 
@@ -147,6 +149,8 @@ template <class P>
 EngineStats HostEngine<P>::stats() const {
   EngineStats stats;
   for (const Tile& tile : tiles_) stats.particles += tile.particles;
+  stats.particles += lone_.particles;
+  stats.lone_particles = lone_.particles;
   stats.tiles = tiles_.size();
   stats.blocks = owned_blocks_;
   stats.halo_bytes_per_step = halo_.bytes_per_step();
@@ -155,7 +159,7 @@ EngineStats HostEngine<P>::stats() const {
       stats.particle_bytes += store_.packs() * ParticleStore<P>::stride(static_cast<Group>(g));
     }
   }
-  stats.particle_bytes += flaw_thresholds_.capacity() * sizeof(float);
+  stats.particle_bytes += flaw_thresholds_.capacity() * sizeof(float) + lone_pull_.capacity() * sizeof(LonePull<P>);
   stats.grid_bytes = (sums_.capacity() + velocities_.capacity()) * sizeof(Real);
   return stats;
 }

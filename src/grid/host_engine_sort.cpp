@@ -43,8 +43,7 @@ void get(const std::byte*& from, T* values, std::size_t count) {
 template <class P>
 std::vector<Placement> HostEngine<P>::place_all() const {
   std::vector<Placement> placements;
-  for_each_particle([&](std::size_t slot, const Tile& tile) {
-    const BlockCoord block = block_coord(blocks_.keys()[tile.block]);
+  for_each_particle([&](std::size_t slot, BlockCoord block) {
     const std::int32_t packed = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
     Placement p{static_cast<std::uint32_t>(slot), {}};
     for (int axis = 0; axis < 3; ++axis) {
@@ -62,7 +61,7 @@ std::vector<Placement> HostEngine<P>::place_all() const {
 
 template <class P>
 void HostEngine<P>::sort() {
-  if (comm_.any(strayed_packs_ != 0)) {
+  if (comm_.any(strayed_packs_ != 0 || lone_strayed())) {
     throw NumericsError(
         "particles moved more than a cell between two sortings, or are not finite: the run is unstable (try a smaller "
         "time.step), or numerics.sort_interval is too long for its speeds");
@@ -74,7 +73,7 @@ template <class P>
 void HostEngine<P>::settle(std::vector<Placement> placements) {
   if (!slabs_chosen_ || unbalanced(placements.size())) choose_slabs(placements);
   migrate(placements);
-  arrange(placements);
+  arrange(separate(std::move(placements)));
   connect_tiles();
   connect_halo();
   colour_planes();
@@ -166,8 +165,9 @@ void HostEngine<P>::migrate(std::vector<Placement>& placements) {
 }
 
 template <class P>
-void HostEngine<P>::arrange(std::span<const Placement> placements) {
+void HostEngine<P>::arrange(const SortedPlacements& all) {
   // Tiles as they are met, then in the order of their keys; a counting sort over (tile, cell) is stable.
+  const std::vector<Placement>& placements = all.tiled;
   blocks_.clear();
   std::vector<std::uint32_t> met(placements.size());
   for (std::size_t i = 0; i < placements.size(); ++i) met[i] = blocks_.insert(block_key(block_of(placements[i].node)));
@@ -194,8 +194,11 @@ void HostEngine<P>::arrange(std::span<const Placement> placements) {
       slot += count;
       tiles_[t].particles += count;
     }
-    packs += (tiles_[t].particles + static_cast<std::uint32_t>(kLanes) - 1) / static_cast<std::uint32_t>(kLanes);
+    packs += packs_for(tiles_[t].particles);
   }
+  lone_ = {packs, static_cast<std::uint32_t>(all.lone.size())};
+  packs += packs_for(lone_.particles);
+
   std::vector<std::uint32_t> source(packs * kLanes, ParticleStore<P>::kEmpty);
   std::vector<std::int32_t> node(source.size(), tile_node({0, 0, 0}));
   for (std::size_t i = 0; i < placements.size(); ++i) {
@@ -203,6 +206,16 @@ void HostEngine<P>::arrange(std::span<const Placement> placements) {
     source[slot] = placements[i].slot;
     node[slot] = tile_node(placements[i].node);
   }
+  lone_block_.clear();
+  lone_node_.clear();
+  for (const Placement& p : all.lone) {
+    const std::size_t slot = lone_.first_pack * kLanes + lone_block_.size();
+    source[slot] = p.slot;
+    node[slot] = tile_node(p.node);
+    lone_block_.push_back(block_of(p.node));
+    lone_node_.push_back(node[slot]);
+  }
+  lone_pull_.resize(packs_for(lone_.particles));
   store_.gather(source);
   for (std::size_t s = 0; s < node.size(); ++s)
     store_.kinematics[s / kLanes].node.set(static_cast<int>(s % kLanes), node[s]);
@@ -214,13 +227,13 @@ void HostEngine<P>::arrange(std::span<const Placement> placements) {
 template <class P>
 void HostEngine<P>::compact_flaws() {
   std::size_t live = 0;
-  for_each_particle([&](std::size_t slot, const Tile&) {
+  for_each_particle([&](std::size_t slot, BlockCoord) {
     live += static_cast<std::size_t>(store_.flaws[slot / kLanes].count[static_cast<int>(slot % kLanes)] >> 16);
   });
   if (flaw_thresholds_.size() <= 2 * live) return;
   std::vector<float> kept;
   kept.reserve(live);
-  for_each_particle([&](std::size_t slot, const Tile&) {
+  for_each_particle([&](std::size_t slot, BlockCoord) {
     Flaws<P>& f = store_.flaws[slot / kLanes];
     const int lane = static_cast<int>(slot % kLanes);
     const auto first = flaw_thresholds_.begin() + f.first[lane];
@@ -234,7 +247,7 @@ template <class P>
 bool HostEngine<P>::finish_damage() {
   if (!setup_.effects.damage) return true;
   bool all_broken = true;
-  for_each_particle([&](std::size_t slot, const Tile&) {
+  for_each_particle([&](std::size_t slot, BlockCoord) {
     all_broken = all_broken && store_.damage_level[slot / kLanes].root[static_cast<int>(slot % kLanes)] >= Real(1);
   });
   if (comm_.any(!all_broken)) return false;

@@ -1,4 +1,5 @@
 // The kernels, compiled once for each instruction set: BRECCIA_ISA is the namespace of this copy.
+#include "grid/lone_pass.hpp"
 #include "grid/tile_pass.hpp"
 
 namespace breccia::grid::BRECCIA_ISA {
@@ -16,11 +17,9 @@ bool matches(const material::RuntimeEffects& fx) {
          fx.viscosity == Fx::viscosity && fx.energy == Fx::energy && fx.fully_damaged == Fx::fully_damaged;
 }
 
-template <class P>
-void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
-  const material::RuntimeEffects& fx = a.effects;
-  const auto run = [&](const auto& effects)
-                       BRECCIA_INLINE_LAMBDA { TilePass(a, effects, scratch<P>()).run(tile, report); };
+// Calls run(effects) with the compile-time policy that equals `fx`, or with fx itself.
+template <class F>
+BRECCIA_HD void specialised(const material::RuntimeEffects& fx, F&& run) {
   if (matches<material::RockEffects>(fx)) {
     run(material::RockEffects{});
   } else if (matches<material::GranularEffects>(fx)) {
@@ -28,6 +27,17 @@ void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
   } else {
     run(fx);
   }
+}
+
+template <class P>
+void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
+  specialised(a.effects,
+              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, scratch<P>(), tile, report); });
+}
+
+template <class P>
+void lone_pass(const PassArguments<P>& a, std::uint32_t first, std::uint32_t last, TileReport& report) {
+  specialised(a.effects, [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_lone(a, fx, first, last, report); });
 }
 
 template <class P>
@@ -54,6 +64,11 @@ void probe(const ProbeArguments<P>& a, std::uint32_t index) {
       a.node_mass[slot] = grid.value[kMass][lane];
     }
   }
+}
+
+template <class P>
+void lone_probe(const ProbeArguments<P>& a) {
+  probe_lone(a);
 }
 
 // [p f m 0] to [p/m f/m 1 0] to [v_new v_old m 0].
@@ -84,7 +99,7 @@ void update_blocks(const NodeArguments<P>& a, std::uint32_t first, std::uint32_t
 
 template <class P>
 const Kernels<P>& kernels() {
-  static constexpr Kernels<P> table{&pass<P>, &probe<P>, &update_blocks<P>};
+  static constexpr Kernels<P> table{&pass<P>, &probe<P>, &lone_pass<P>, &lone_probe<P>, &update_blocks<P>};
   return table;
 }
 template const Kernels<MixedPrecision>& kernels<MixedPrecision>();

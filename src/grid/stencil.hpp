@@ -42,12 +42,15 @@ struct Stencil {
     typename P::IntPack axis[3];
   };
 
+  BRECCIA_HD static Place place(const Kinematics<P>& k) {
+    return {stencil_start(k.node, 0), stencil_start(k.node, 1), stencil_start(k.node, 2)};
+  }
+
   /// Sets the stencil of all lanes. The start of those outside the margin is made harmless.
   BRECCIA_HD Place set(const Kinematics<P>& k) {
     using I = typename P::IntPack;
-    const I x = stencil_start(k.node, 0);
-    const I y = stencil_start(k.node, 1);
-    const I z = stencil_start(k.node, 2);
+    const Place p = place(k);
+    const I z = p.axis[2];
     for (int axis = 0; axis < 3; ++axis) offset[axis] = offset_in_cells(k.offset[axis]);
     store(Weights(offset[0]), weight[0]);
     store(Weights(offset[1]), weight[1]);
@@ -57,8 +60,8 @@ struct Stencil {
       store(Weights(offset[2]), weight_z);
     }
     const I first = kNodePairs<P> ? z & I(~1) : z;
-    select(outside({x, y, z}), I(0), x * I(kTilePlane) + y * I(kTileWidth) + first).store(start);
-    return {x, y, z};
+    select(outside(p), I(0), p.axis[0] * I(kTilePlane) + p.axis[1] * I(kTileWidth) + first).store(start);
+    return p;
   }
 
   /// Lanes whose stencil reaches beyond the tile.
@@ -67,6 +70,17 @@ struct Stencil {
     const I low = min(min(place.axis[0], place.axis[1]), place.axis[2]);
     const I high = max(max(place.axis[0], place.axis[1]), place.axis[2]);
     return (low < I(0)) | (high > I(kTileWidth - 3));
+  }
+
+  /// sum over the nodes of w^2.
+  BRECCIA_HD Real sum_of_squares(int lane) const {
+    Real x(0), y(0), z(0);
+    for (int i = 0; i < 3; ++i) {
+      x += weight[0][i][lane] * weight[0][i][lane];
+      y += weight[1][i][lane] * weight[1][i][lane];
+    }
+    for (int i = 0; i < kAlongZ; ++i) z += weight_z[i][lane] * weight_z[i][lane];
+    return x * y * z;
   }
 
  private:

@@ -46,7 +46,19 @@ struct TileBox {
 
 inline constexpr TileBox kWholeTile{{0, 0, 0}, {kTileWidth - 1, kTileWidth - 1, kTileWidth - 1}};
 
-/// What a pass over a tile found.
+/// Packs of particles that no other particle can meet before the next sorting (lone_pass.hpp). They follow the tiles.
+struct LonePacks {
+  std::uint32_t first_pack = 0;
+  std::uint32_t particles = 0;
+};
+
+/// What a kick takes from C of a lone particle, by the stress of its last scatter: (4/dx^2) (V0/m) tau [1/s2].
+template <class P>
+struct LonePull {
+  Sym3<typename P::RealPack> rate;
+};
+
+/// What a pass over a tile, or over a stretch of lone packs, found.
 struct TileReport {
   double plastic_work = 0.0;  ///< [J]
   double viscous_work = 0.0;  ///< [J]
@@ -77,6 +89,8 @@ struct PassArguments {
   HeldGravity<P>* gravity = nullptr;  ///< null: no self-gravity
   Identity<P>* identity = nullptr;
   Affine<P>* affine = nullptr;
+  LonePacks lone;
+  LonePull<P>* lone_pull = nullptr;  ///< one for each lone pack
 
   const Real* velocities = nullptr;        ///< [blocks][64][8], VelocityChannel
   Real* sums = nullptr;                    ///< [blocks][64][8], SumChannel
@@ -87,6 +101,7 @@ struct PassArguments {
 
   Real cell = 0;
   Real step = 0;              ///< dt of the drift and of the strain push [s]
+  Real kick = 0;              ///< dt of the grid's last kick, for particles that use no grid [s]
   Real stress_half_step = 0;  ///< half the dt over which C was the velocity gradient [s]
   Vec3<Real> uniform_gravity{};
   TransferParameters transfer;
@@ -106,6 +121,11 @@ struct ProbeArguments {
   TransferParameters transfer;
   Real* new_velocity = nullptr;  ///< [slots][3] v_p^{n+1/2}
   Real* node_mass = nullptr;     ///< [slots] sum of w m_i
+
+  LonePacks lone;
+  const HeldGravity<P>* gravity = nullptr;
+  Vec3<Real> uniform_gravity{};
+  Real kick = 0;
 };
 
 /// Grid update of whole blocks: sums to velocities, sums cleared.
@@ -123,6 +143,9 @@ template <class P>
 struct Kernels {
   void (*pass)(const PassArguments<P>&, std::uint32_t tile, TileReport&);
   void (*probe)(const ProbeArguments<P>&, std::uint32_t tile);
+  /// The same for the lone packs first .. last-1, counted from 0.
+  void (*lone_pass)(const PassArguments<P>&, std::uint32_t first, std::uint32_t last, TileReport&);
+  void (*lone_probe)(const ProbeArguments<P>&);
   void (*update_blocks)(const NodeArguments<P>&, std::uint32_t first_block, std::uint32_t last_block);
 };
 

@@ -45,6 +45,8 @@ ReferenceStep::ReferenceStep(const ReferenceSetup& setup, const ParticleArrays& 
     p.x = particles.position[i];
     p.v = particles.velocity[i];
     p.mass = particles.mass[i];
+    const Vec3d w = setup.spin;
+    p.c = {0.0, -w.z, w.y, w.z, 0.0, -w.x, -w.y, w.x, 0.0};
     p.growth = material::crack_growth_rate(setup.material, p.mass / setup.material.eos.rho0);
     p.state.damage_root = std::cbrt(particles.damage[i]);
     if (setup.effects.damage) p.flaws.assign(flaws.of(i).begin(), flaws.of(i).end());

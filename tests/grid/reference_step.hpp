@@ -29,6 +29,7 @@ struct ReferenceSetup {
   double alpha = 0.995;
   double beta = 1.0;
   Vec3d gravity{};
+  Vec3d spin{};  ///< of all particles at the start [rad/s]
   material::RuntimeEffects effects;
   MaterialParameters material;
 };

@@ -12,12 +12,13 @@ namespace {
 constexpr double kCell = 2500.0;
 constexpr double kMass = 3e13;
 
-EngineSetup setup_for(Precision precision) {
+EngineSetup setup_for(Precision precision, bool lone_without_grid = true) {
   EngineSetup setup;
   setup.cell = kCell;
   setup.materials.resize(1);
   setup.effects = {.damage = false, .fully_damaged = true};
   setup.numerics.precision = precision;
+  setup.numerics.lone_without_grid = lone_without_grid;
   return setup;
 }
 
@@ -50,45 +51,50 @@ std::unique_ptr<Engine> engine_with(const EngineSetup& setup, const std::vector<
 
 // Cases 1, 2 and 18: positions on faces, at half cells, a hair beside them, on both sides of zero. A lone particle must
 // move straight on whatever its weights are: the affine field of one particle is reproduced exactly.
+void expect_straight(Precision precision, bool lone_without_grid) {
+  std::vector<Vec3d> x;
+  const double offsets[] = {0.0, -0.0, 0.5, -0.5, 0.5 + 1e-12, 0.5 - 1e-12, 1e-9, -1e-9, 0.25, 1.5, -1.5 + 1e-7};
+  double far = 0.0;
+  for (const double a : offsets) {
+    for (const double b : offsets)
+      x.push_back(Vec3d{(a + far) * kCell, (b - far) * kCell, (a - b) * kCell}), far += 40.0;
+  }
+  const std::vector<Vec3d> v(x.size(), Vec3d{3.0, -100.0, 0.25});
+  const mpi::Comm comm;
+  const auto engine = engine_with(setup_for(precision, lone_without_grid), x, v, comm);
+  EXPECT_EQ(comm.sum(engine->stats().lone_particles) > 0, lone_without_grid);
+  const double dt = 0.1220703125;
+  constexpr int kSteps = 200;
+  engine->scatter(0.5 * dt);
+  for (int n = 1; n <= kSteps; ++n) {
+    engine->update_grid(dt);
+    engine->gather(dt);
+    if (n % 16 == 0) engine->sort();
+    engine->scatter(0.5 * dt);
+  }
+  engine->update_grid(dt);
+  const ParticleOutput out = engine->observe();
+  // Mixed: 6e-8 of 100 m/s per step may go one way for all 200 steps: 1.2e-3 m/s, 0.03 m.
+  const double tolerance = precision == Precision::kMixed ? 0.05 : 1e-8;
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    const Vec3d expected = x[out.id[i]] + (kSteps * dt) * v[0];
+    EXPECT_NEAR(out.position[i].x, expected.x, tolerance) << "particle " << out.id[i];
+    EXPECT_NEAR(out.position[i].y, expected.y, tolerance) << "particle " << out.id[i];
+    EXPECT_NEAR(out.position[i].z, expected.z, tolerance) << "particle " << out.id[i];
+  }
+  EXPECT_EQ(comm.sum<std::uint64_t>(out.size()), x.size());
+}
 TEST(HardCases, LoneParticleMovesStraightFromAnywhereInACell) {
   for (const Precision precision : {Precision::kMixed, Precision::kDouble}) {
-    std::vector<Vec3d> x;
-    const double offsets[] = {0.0, -0.0, 0.5, -0.5, 0.5 + 1e-12, 0.5 - 1e-12, 1e-9, -1e-9, 0.25, 1.5, -1.5 + 1e-7};
-    double far = 0.0;
-    for (const double a : offsets) {
-      for (const double b : offsets)
-        x.push_back(Vec3d{(a + far) * kCell, (b - far) * kCell, (a - b) * kCell}), far += 40.0;
-    }
-    const std::vector<Vec3d> v(x.size(), Vec3d{3.0, -100.0, 0.25});
-    const mpi::Comm comm;
-    const auto engine = engine_with(setup_for(precision), x, v, comm);
-    const double dt = 0.1220703125;
-    constexpr int kSteps = 200;
-    engine->scatter(0.5 * dt);
-    for (int n = 1; n <= kSteps; ++n) {
-      engine->update_grid(dt);
-      engine->gather(dt);
-      if (n % 16 == 0) engine->sort();
-      engine->scatter(0.5 * dt);
-    }
-    engine->update_grid(dt);
-    const ParticleOutput out = engine->observe();
-    // Mixed: 6e-8 of 100 m/s per step may go one way for all 200 steps: 1.2e-3 m/s, 0.03 m.
-    const double tolerance = precision == Precision::kMixed ? 0.05 : 1e-8;
-    for (std::size_t i = 0; i < out.size(); ++i) {
-      const Vec3d expected = x[out.id[i]] + (kSteps * dt) * v[0];
-      EXPECT_NEAR(out.position[i].x, expected.x, tolerance) << "particle " << out.id[i];
-      EXPECT_NEAR(out.position[i].y, expected.y, tolerance) << "particle " << out.id[i];
-      EXPECT_NEAR(out.position[i].z, expected.z, tolerance) << "particle " << out.id[i];
-    }
-    EXPECT_EQ(comm.sum<std::uint64_t>(out.size()), x.size());
+    for (const bool lone_without_grid : {false, true}) expect_straight(precision, lone_without_grid);
   }
 }
 
 // Case 12, in small: 1 m/s at 2e7 m. Over 1e4 steps of 0.12 s a float position would not move at all.
-TEST(HardCases, SlowDriftFarAwayIsNotLost) {
+void expect_slow_drift(bool lone_without_grid) {
   const mpi::Comm comm;
-  const auto engine = engine_with(setup_for(Precision::kMixed), {{2e7, -2e7, 2e7}}, {{1.0, 0.0, 0.0}}, comm);
+  const auto engine =
+      engine_with(setup_for(Precision::kMixed, lone_without_grid), {{2e7, -2e7, 2e7}}, {{1.0, 0.0, 0.0}}, comm);
   const double dt = 0.1220703125;
   constexpr int kSteps = 10000;
   engine->scatter(0.5 * dt);
@@ -107,6 +113,9 @@ TEST(HardCases, SlowDriftFarAwayIsNotLost) {
   // 1 m/s dt is 209715.2 units of 2^-32 cells, rounded to 0.2 of them: 1e-6 of 1220.7 m.
   for (const Vec3d& x : out.position) EXPECT_NEAR(x.x, 2e7 + kSteps * dt, 0.01);
 }
+TEST(HardCases, SlowDriftFarAwayIsNotLost) {
+  for (const bool lone_without_grid : {false, true}) expect_slow_drift(lone_without_grid);
+}
 
 // Case 13: particles spread over 4e7 m cost their number, not the volume between them.
 TEST(HardCases, FarLoneParticlesCostBlocksByTheirNumber) {
@@ -116,16 +125,20 @@ TEST(HardCases, FarLoneParticlesCostBlocksByTheirNumber) {
     const double r = 4e7 * (i + 1) / 1000.0;
     x.push_back({r * std::cos(i), r * std::sin(i), r * std::cos(2.0 * i)});
   }
-  const auto engine = engine_with(setup_for(Precision::kMixed), x, std::vector<Vec3d>(1000, Vec3d{400, 0, 0}), comm);
-  // A particle reaches 5 nodes an axis: at most 2 blocks an axis.
-  EXPECT_LE(comm.sum(engine->stats().blocks), 8U * 1000U);
+  const std::vector<Vec3d> v(1000, Vec3d{400, 0, 0});
+  // A particle reaches 5 nodes an axis: at most 2 blocks an axis. Without a grid it has none; near the cut between two
+  // ranks nobody knows whether it is alone.
+  EXPECT_LE(comm.sum(engine_with(setup_for(Precision::kMixed, false), x, v, comm)->stats().blocks), 8U * 1000U);
+  EXPECT_LE(comm.sum(engine_with(setup_for(Precision::kMixed), x, v, comm)->stats().blocks),
+            comm.size() == 1 ? 0U : 8U * 100U);
 }
 
 // Case 29 in small and the margin: a particle that crosses more than a cell between two sortings is an error on every
 // rank, not a silent loss.
-TEST(HardCases, TooFastForTheSortIntervalIsAnErrorOnAllRanks) {
+void expect_too_fast(bool lone_without_grid) {
   const mpi::Comm comm;
-  const auto engine = engine_with(setup_for(Precision::kMixed), {{0, 0, 0}}, {{40000.0, 0.0, 0.0}}, comm);
+  const auto engine =
+      engine_with(setup_for(Precision::kMixed, lone_without_grid), {{0, 0, 0}}, {{40000.0, 0.0, 0.0}}, comm);
   const double dt = 0.05;  // 0.8 cells a step: the fourth one reaches a block it could not reach when it was sorted
   engine->scatter(0.5 * dt);
   for (int n = 0; n < 4; ++n) {
@@ -135,6 +148,10 @@ TEST(HardCases, TooFastForTheSortIntervalIsAnErrorOnAllRanks) {
   engine->update_grid(dt);
   engine->gather(dt);
   EXPECT_THROW(engine->sort(), NumericsError);
+}
+TEST(HardCases, TooFastForTheSortIntervalIsAnErrorOnAllRanks) {
+  expect_too_fast(false);
+  expect_too_fast(true);
 }
 
 TEST(HardCases, BeyondTheKeysIsAUsageError) {

@@ -1,0 +1,89 @@
+// Which particles share no node with another one until the next sorting.
+#include <array>
+#include <cstdlib>
+
+#include "grid/host_engine.hpp"
+
+namespace breccia::grid {
+namespace {
+
+constexpr BlockCoord block_of(const Placement& p) { return {p.node[0] >> 2, p.node[1] >> 2, p.node[2] >> 2}; }
+
+// Particles of each block: how many, and one of them.
+struct Occupants {
+  BlockTable blocks;
+  std::vector<std::uint32_t> count;
+  std::vector<std::uint32_t> member;
+
+  explicit Occupants(std::span<const Placement> placements) {
+    for (std::uint32_t i = 0; i < placements.size(); ++i) {
+      const std::uint32_t b = blocks.insert(block_key(block_of(placements[i])));
+      if (b == count.size()) {
+        count.push_back(0);
+        member.push_back(i);
+      }
+      ++count[b];
+    }
+  }
+};
+
+// Stencils touch when nearest nodes differ by at most 2 along every axis, and each particle may drift one node until
+// the next sorting.
+constexpr std::int32_t kReach = 2 + 2;
+
+}  // namespace
+
+template <class P>
+SortedPlacements HostEngine<P>::separate(std::vector<Placement> placements) {
+  SortedPlacements sorted;
+  // Walls act on nodes: a particle needs them near one.
+  if (boundaries_.has_walls() || !setup_.numerics.lone_without_grid) {
+    sorted.tiled = std::move(placements);
+    return sorted;
+  }
+  const Occupants occupants(placements);
+  const auto is_alone = [&](const Placement& p) {
+    const BlockCoord own = block_of(p);
+    if (occupants.count[occupants.blocks.find(block_key(own))] != 1) return false;
+    for (int n = 0; n < 27; ++n) {
+      const std::array<int, 3> d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
+      const BlockCoord there = periodicity_.wrap({own.x + d[0], own.y + d[1], own.z + d[2]});
+      // What other ranks hold is not known here.
+      if (owner(there) != comm_.rank()) return false;
+      if (n == 13) continue;
+      const std::uint32_t b = occupants.blocks.find(block_key(there));
+      if (b == kNoBlock) continue;
+      if (occupants.count[b] > 1) return false;
+      const Placement& other = placements[occupants.member[b]];
+      bool near = true;
+      for (int axis = 0; axis < 3; ++axis) {
+        const int apart = kBlockWidth * d[static_cast<std::size_t>(axis)] + (other.node[axis] & 3) - (p.node[axis] & 3);
+        near = near && std::abs(apart) <= kReach;
+      }
+      if (near) return false;
+    }
+    return true;
+  };
+  for (const Placement& p : placements) (is_alone(p) ? sorted.lone : sorted.tiled).push_back(p);
+  return sorted;
+}
+
+template <class P>
+bool HostEngine<P>::lone_strayed() const {
+  for (std::uint32_t n = 0; n < lone_.particles; ++n) {
+    const std::size_t slot = lone_.first_pack * kLanes + n;
+    const std::int32_t now = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
+    for (int axis = 0; axis < 3; ++axis) {
+      const int drift = ((now >> (8 * axis)) & 255) - ((lone_node_[n] >> (8 * axis)) & 255);
+      if (std::abs(drift) > 1) return true;
+    }
+  }
+  return false;
+}
+
+template bool HostEngine<MixedPrecision>::lone_strayed() const;
+template bool HostEngine<DoublePrecision>::lone_strayed() const;
+template SortedPlacements HostEngine<MixedPrecision>::separate(std::vector<Placement>);
+template SortedPlacements HostEngine<DoublePrecision>::separate(std::vector<Placement>);
+
+}  // namespace breccia::grid
