@@ -76,6 +76,7 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
   a.kick = static_cast<Real>(kick_);
   a.velocities = velocities_.data();
   a.sums = sums_.data();
+  a.rows = rows_.data();
   a.flaw_thresholds = flaw_thresholds_.data();
   a.materials = constants_.data();
   a.material_count = static_cast<int>(constants_.size());
@@ -143,9 +144,11 @@ template <class P>
 void HostEngine<P>::update_grid(double kick) {
   kick_ = kick;
   halo_.add_to_owners(sums_.data(), comm_);
+  for (const std::uint32_t block : shared_blocks_) rows_[block] = kAllRows;
   NodeArguments<P> a;
   a.sums = sums_.data();
   a.velocities = velocities_.data();
+  a.rows = rows_.data();
   a.kick = static_cast<Real>(kick);
   a.smallest_mass = static_cast<Real>(1e-30 * smallest_mass_);
   const auto blocks = static_cast<std::uint32_t>(owned_blocks_);

@@ -113,6 +113,8 @@ class HostEngine final : public Engine {
   BlockTable blocks_;
   std::vector<Real> sums_;
   std::vector<Real> velocities_;
+  std::vector<RowMask> rows_;
+  std::vector<std::uint32_t> shared_blocks_;  // owned blocks that other ranks add to
   std::size_t owned_blocks_ = 0;
   double smallest_mass_ = 0.0;
   std::uint64_t strayed_packs_ = 0;  // seen since the last sorting; reported there, on all ranks at once

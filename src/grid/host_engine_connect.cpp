@@ -69,8 +69,17 @@ void HostEngine<P>::connect_tiles() {
     for_each_reached(store_, tiles_[t], block_coord(blocks_.keys()[t]), periodicity_,
                      [&](int n, BlockCoord b) { tiles_[t].neighbours[n] = blocks_.find(block_key(b)); });
   }
-  sums_.assign(blocks_.size() * kBlockNodes * kChannels, Real(0));
-  velocities_.assign(sums_.size(), Real(0));
+  // The grid update has cleared every sum. Old velocities stay where they are: only nodes that a scatter has reached
+  // since are read.
+  const std::size_t nodes = blocks_.size() * kBlockNodes * kChannels;
+  if (nodes > sums_.capacity()) {
+    // Some room for the next sortings, not twice as much as push_back would take.
+    sums_.reserve(nodes + nodes / 16);
+    velocities_.reserve(nodes + nodes / 16);
+  }
+  sums_.resize(nodes);
+  velocities_.resize(nodes);
+  rows_.assign(blocks_.size(), 0);
   boundaries_.find_nodes(std::span(blocks_.keys()).first(owned_blocks_));
 }
 
@@ -114,7 +123,12 @@ void HostEngine<P>::connect_halo() {
     return peers;
   };
   auto touched = nodes_of(requests);
-  halo_.set(std::move(touched), nodes_of(comm_.alltoall(requests)));
+  const auto asked = comm_.alltoall(requests);
+  shared_blocks_.clear();
+  for (const std::vector<Request>& of_rank : asked) {
+    for (const Request& request : of_rank) shared_blocks_.push_back(blocks_.find(request.key));
+  }
+  halo_.set(std::move(touched), nodes_of(asked));
 }
 
 template <class P>

@@ -83,15 +83,30 @@ BRECCIA_HD Node<P> node_velocities(Node<P> sums, typename P::Real mass, typename
 }
 
 template <class P>
-void update_blocks(const NodeArguments<P>& a, std::uint32_t first, std::uint32_t last) {
+BRECCIA_HD void update_nodes(const NodeArguments<P>& a, std::size_t first, std::size_t count) {
   using N = Node<P>;
-  for (std::size_t n = std::size_t{first} * kBlockNodes; n < std::size_t{last} * kBlockNodes; ++n) {
+  for (std::size_t n = first; n < first + count; ++n) {
     typename P::Real* sums = a.sums + n * kChannels;
     const typename P::Real mass = sums[kMass];
     const N values = N::load(sums);
-    N{}.store(sums);
-    const N velocities = mass > a.smallest_mass ? node_velocities<P>(values, mass, a.kick) : N{};
+    N(typename P::Real(0)).store(sums);
+    const N velocities = mass > a.smallest_mass ? node_velocities<P>(values, mass, a.kick) : N(typename P::Real(0));
     velocities.store(a.velocities + n * kChannels);
+  }
+}
+
+template <class P>
+void update_blocks(const NodeArguments<P>& a, std::uint32_t first, std::uint32_t last) {
+  for (std::size_t block = first; block < last; ++block) {
+    const RowMask rows = a.rows[block];
+    a.rows[block] = 0;
+    if (rows == kAllRows) {
+      update_nodes(a, block * kBlockNodes, kBlockNodes);
+      continue;
+    }
+    for (std::size_t row = 0; row < kBlockNodes / kBlockWidth; ++row) {
+      if ((rows >> row & 1) != 0) update_nodes(a, block * kBlockNodes + row * kBlockWidth, kBlockWidth);
+    }
   }
 }
 

@@ -23,6 +23,10 @@ constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTil
 inline constexpr int kNodeBias = 8;  ///< keeps the 8-bit tile coordinates positive
 inline constexpr std::uint32_t kNoBlock = 0xffffffffU;
 
+/// Which of the 16 rows along z of a block, row 4 x + y, hold something.
+using RowMask = std::uint16_t;
+inline constexpr RowMask kAllRows = 0xffff;
+
 /// Channels of a node. Sums while particles scatter, velocities after the grid update.
 inline constexpr int kChannels = 8;
 enum SumChannel { kMomentum = 0, kForce = 3, kMass = 6 };
@@ -94,6 +98,7 @@ struct PassArguments {
 
   const Real* velocities = nullptr;        ///< [blocks][64][8], VelocityChannel
   Real* sums = nullptr;                    ///< [blocks][64][8], SumChannel
+  RowMask* rows = nullptr;                 ///< [blocks] rows that a scatter has added to
   const float* flaw_thresholds = nullptr;  ///< arena of this rank
   const material::Constants<Real>* materials = nullptr;
   int material_count = 1;
@@ -128,12 +133,13 @@ struct ProbeArguments {
   Real kick = 0;
 };
 
-/// Grid update of whole blocks: sums to velocities, sums cleared.
+/// Grid update of the marked rows of blocks: sums to velocities, sums and marks cleared.
 template <class P>
 struct NodeArguments {
   using Real = typename P::Real;
   Real* sums = nullptr;
   Real* velocities = nullptr;
+  RowMask* rows = nullptr;
   Real kick = 0;           ///< dt of the kick [s]
   Real smallest_mass = 0;  ///< nodes with less are empty (hard case 2) [kg]
 };

@@ -85,6 +85,27 @@ template <class P>
   return lost;
 }
 
+/// Marks the rows of the blocks that a box reaches.
+BRECCIA_HD void mark_rows(const Tile& tile, const TileBox& box, RowMask* rows) {
+  // Nodes of a tile to those of the block below, its own and the one above, four bits each.
+  const auto touched = [&](int axis, int block) BRECCIA_INLINE_LAMBDA {
+    const unsigned all = (2U << box.high[axis]) - (1U << box.low[axis]);
+    return (all << (kBlockWidth - kTileMargin)) >> (kBlockWidth * block) & 0xfU;
+  };
+  for (int bx = 0; bx < 3; ++bx) {
+    const unsigned x = touched(0, bx);
+    const unsigned spread = (x & 1U) | (x & 2U) << 3 | (x & 4U) << 6 | (x & 8U) << 9;
+    for (int by = 0; by < 3; ++by) {
+      const unsigned mask = spread * touched(1, by);
+      for (int bz = 0; bz < 3; ++bz) {
+        const std::uint32_t block = tile.neighbours[(bx * 3 + by) * 3 + bz];
+        if (block == kNoBlock || touched(2, bz) == 0) continue;
+        rows[block] = static_cast<RowMask>(rows[block] | mask);
+      }
+    }
+  }
+}
+
 /// Zeroes the nodes that the particles of a tile can reach in one step from those of `box`.
 template <class P>
 BRECCIA_HD void clear_tile(const TileBox& box, typename P::Real* nodes) {

@@ -33,6 +33,7 @@ class TileGrid {
   BRECCIA_HD void store(std::uint32_t tile, TileReport& report) {
     if (!a_.scatter) return;
     a_.boxes[tile] = touched_.box();
+    mark_rows(a_.tiles[tile], a_.boxes[tile], a_.rows);
     if (add_tile<P>(a_.tiles[tile], a_.boxes[tile], scratch_.sums, a_.sums)) ++report.strayed;
   }
 
