@@ -5,6 +5,7 @@
 
 #include "breccia/error.hpp"
 #include "gravity/direct_sum.hpp"
+#include "gravity/tree/tree_solver.hpp"
 
 namespace breccia::gravity {
 
@@ -21,7 +22,7 @@ std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& para
     case GravityMethod::kOff:
       throw UsageError("effects.gravity = off: there is nothing to evaluate; use direct");
     case GravityMethod::kTree:
-      throw UsageError("effects.gravity = tree: this version has no tree; use direct");
+      return std::make_unique<TreeSolver>(parameters, comm, threads);
     case GravityMethod::kTreePm:
       throw UsageError("effects.gravity = treepm: this version has no particle mesh; use direct");
   }
