@@ -33,18 +33,19 @@ void list_coarse_cells(const Tree& tree, const Cell& group, Sampling& s) {
   s.work.cells.clear();
   s.stack.assign(1, 0);
   while (!s.stack.empty()) {
-    const Cell& cell = tree.cell(s.stack.back());
+    const std::int32_t c = s.stack.back();
     s.stack.pop_back();
+    const Cell& cell = tree.cell(c);
     const bool own = contains(cell, group);
     if (cell.count > coarse && !cell.is_leaf()) {
       const Vec3d d = group.centre - cell.centre;
-      const double size = cell.radius + group.radius;
+      const double size = cell.radius + 0.5 * group.radius;
       if (own || size * size >= kScaleOpening * kScaleOpening * dot(d, d)) {
-        for (int c = 0; c < cell.children; ++c) s.stack.push_back(cell.first_child + c);
+        for (int k = 0; k < cell.children; ++k) s.stack.push_back(cell.first_child + k);
         continue;
       }
     }
-    if (!own) s.work.cells.add(cell, group.centre);
+    if (!own) s.work.cells.push_back(c);
   }
 }
 
@@ -65,15 +66,14 @@ double scale_of(const Tree& tree, const Cell& group, double softening, Sampling&
   task.softening_squared = static_cast<float>(softening * softening);
   for (int axis = 0; axis < 3; ++axis) task.acceleration[axis] = s.sums[axis];
   for (auto& component : s.sums) std::fill(std::begin(component), std::end(component), 0.0);
-  s.work.lend_to(task);
+  s.work.lend_to(task, tree);
   interaction_kernels<float>().evaluate_group(task);
 
   double least = std::numeric_limits<double>::max();
   for (int k = 0; k < kSamples; ++k) {
     least = std::min(least, std::hypot(s.sums[0][k], s.sums[1][k], s.sums[2][k]));
   }
-  const double own = group.radius > 0.0 ? group.moments.mass / (group.radius * group.radius) : 0.0;
-  return std::hypot(least, own);
+  return least;
 }
 
 }  // namespace

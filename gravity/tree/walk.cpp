@@ -30,7 +30,7 @@ struct Candidates {
 template <class Real>
 struct Walking {
   Workspace<Real> work;
-  CellList<Real> expansions;
+  std::vector<std::int32_t> expansions;
   std::vector<std::int32_t> candidates;
   std::vector<std::int32_t> stack;
   double reach;  ///< farthest particle among the sources of this group, from its centre
@@ -114,7 +114,7 @@ class Walker {
         w.stack.pop_back();
         const Cell& source = sources_.cell(s);
         if (expandable(source, target, allowed)) {
-          w.expansions.add(source, target.centre);
+          w.expansions.push_back(s);
         } else if (!source.is_leaf() && source.radius >= target.radius) {
           push_children(w.stack, source);
         } else {
@@ -122,16 +122,14 @@ class Walker {
         }
       }
     }
-    expand_listed(w, far);
+    expand_listed(w, target, far);
     return {begin, w.candidates.size()};
   }
 
-  void expand_listed(Walking<Real>& w, LocalExpansion<double>& far) const {
-    const std::int64_t count = w.expansions.arrays().count;
-    if (count == 0) return;
-    w.counts.expansions += static_cast<double>(count);
-    w.expansions.pad();
-    kernels_.expand(ExpansionTask<Real>{w.expansions.arrays(), softening_squared(), &far});
+  void expand_listed(Walking<Real>& w, const Cell& target, LocalExpansion<double>& far) const {
+    w.counts.expansions += static_cast<double>(w.expansions.size());
+    if (w.expansions.empty()) return;
+    kernels_.expand({refs(w.expansions, sources_), target.centre, softening_squared(), &far});
   }
 
   // Everything that is left acts on the group's particles directly.
@@ -144,7 +142,7 @@ class Walker {
     w.reach = group.radius;
     if (same) w.work.ranges.push_back({group.begin, group.end});
     list_sources(w, t, from, same);
-    expand_listed(w, far);
+    expand_listed(w, group, far);
 
     GroupTask<Real> task{};
     task.targets = mass_arrays(targets_.particles);
@@ -158,7 +156,7 @@ class Walker {
     task.softening_squared = softening_squared();
     for (int axis = 0; axis < 3; ++axis) task.acceleration[axis] = sums_.acceleration[axis].data();
     task.potential = sums_.potential.empty() ? nullptr : sums_.potential.data();
-    w.work.lend_to(task);
+    w.work.lend_to(task, sources_);
     kernels_.evaluate_group(task);
     count(w, task);
   }
@@ -169,13 +167,15 @@ class Walker {
     for (std::size_t k = from.begin; k < from.end; ++k) {
       w.stack.assign(1, w.candidates[k]);
       while (!w.stack.empty()) {
-        const Cell& source = sources_.cell(w.stack.back());
+        const std::int32_t s = w.stack.back();
         w.stack.pop_back();
+        const Cell& source = sources_.cell(s);
         if (same && source.begin >= group.begin && source.end <= group.end && source.end > source.begin) continue;
-        if (source.count > kFewParticles && expandable(source, group, allowed)) {
-          w.expansions.add(source, group.centre);
-        } else if (source.count > kFewParticles && visible_whole(source, group, allowed)) {
-          w.work.cells.add(source, group.centre);
+        const Opening how = source.count > kFewParticles ? opening(source, group, allowed) : Opening::kOpen;
+        if (how == Opening::kExpand) {
+          w.expansions.push_back(s);
+        } else if (how == Opening::kWhole) {
+          w.work.cells.push_back(s);
         } else if (source.is_leaf()) {
           w.work.add_range(source.begin, source.end);
           const Vec3d d = source.centre - group.centre;
