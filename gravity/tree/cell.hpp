@@ -24,7 +24,8 @@ struct alignas(64) Cell {
   bool is_target = true;            ///< holds particles whose field this rank computes
 
   [[nodiscard]] bool is_leaf() const { return children == 0; }
-  [[nodiscard]] bool is_group() const { return count <= kGroupParticles; }
+  /// Targets below this cell share its interactions.
+  [[nodiscard]] bool is_group() const { return count <= kGroupParticles || is_leaf(); }
 };
 
 }  // namespace breccia::gravity

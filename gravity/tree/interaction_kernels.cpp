@@ -43,8 +43,8 @@ void copy_relative(const MassArrays& from, std::int64_t begin, std::int64_t end,
 
 template <class Real>
 Relative<Real> relative(const Real* first, std::int64_t stride, const Real* mass) {
-  return {{first, first + stride, first + 2 * stride}, {first + 3 * stride, first + 4 * stride, first + 5 * stride},
-          mass};
+  return {
+      {first, first + stride, first + 2 * stride}, {first + 3 * stride, first + 4 * stride, first + 5 * stride}, mass};
 }
 
 template <class V, bool kPotential>

@@ -35,14 +35,14 @@ template <class Real>
 struct GroupTask {
   MassArrays targets;
   std::int64_t begin, end;
-  Vec3d centre;                         ///< origin of the relative coordinates, and of `far`
-  const LocalExpansion<double>* far;    ///< null: none
-  CellRefs cells;                       ///< seen with monopole and quadrupole
-  MassArrays sources;                   ///< summed particle by particle ...
-  const Range* ranges;                  ///< ... in these ranges
+  Vec3d centre;                       ///< origin of the relative coordinates, and of `far`
+  const LocalExpansion<double>* far;  ///< null: none
+  CellRefs cells;                     ///< seen with monopole and quadrupole
+  MassArrays sources;                 ///< summed particle by particle ...
+  const Range* ranges;                ///< ... in these ranges
   std::int64_t range_count;
-  bool self;                 ///< the first range is the targets themselves
-  bool split_coordinates;    ///< closest particles are close enough to need two floats per coordinate
+  bool self;               ///< the first range is the targets themselves
+  bool split_coordinates;  ///< closest particles are close enough to need two floats per coordinate
   Real softening_squared;
   double* acceleration[3];
   double* potential;  ///< null: not wanted

@@ -52,13 +52,13 @@ inline Opening opening(const Cell& source, const Cell& target, double largest_er
   if (d2 <= detail::square(target.radius + source.radius / kLargestOpening)) return Opening::kOpen;
   const double distance = std::sqrt(d2);
   const double size = source.radius + target.radius;
-  if (size < kLargestOpening * distance &&
-      detail::expandable(source, target, d2, 1.0 / distance, largest_error)) {
+  if (size < kLargestOpening * distance && detail::expandable(source, target, d2, 1.0 / distance, largest_error)) {
     return Opening::kExpand;
   }
   const double nearest = distance - target.radius;
   const double b = source.radius;
-  const bool whole = kOctupole * source.moments.mass * (b * b * b) < largest_error * detail::square(detail::square(nearest)) * nearest;
+  const bool whole =
+      kOctupole * source.moments.mass * (b * b * b) < largest_error * detail::square(detail::square(nearest)) * nearest;
   return whole ? Opening::kWhole : Opening::kOpen;
 }
 

@@ -58,6 +58,10 @@ class Tree {
   /// Moments of an inner cell from its children, of a leaf from its particles.
   void set_moments(Cell& cell) const;
 
+  /// Cells whose particles share their interactions, in the order of their particles: the largest that are no
+  /// more than kGroupParticles or cannot be split.
+  [[nodiscard]] std::vector<std::int32_t> groups() const;
+
   [[nodiscard]] const Cell& cell(std::int32_t i) const { return cells[static_cast<std::size_t>(i)]; }
   [[nodiscard]] std::span<const Cell> children(const Cell& c) const {
     return std::span(cells).subspan(static_cast<std::size_t>(c.first_child), static_cast<std::size_t>(c.children));

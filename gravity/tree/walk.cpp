@@ -74,20 +74,18 @@ class Walker {
   [[nodiscard]] double largest_error(std::int32_t t) const {
     return settings_.tolerance * scales_[static_cast<std::size_t>(t)];
   }
-  [[nodiscard]] Real softening_squared() const {
-    return static_cast<Real>(settings_.softening * settings_.softening);
-  }
+  [[nodiscard]] Real softening_squared() const { return static_cast<Real>(settings_.softening * settings_.softening); }
 
   // `in_trunk`: stops at cells small enough to be branches, and keeps those for later.
   void descend(Walking<Real>& w, std::int32_t t, Candidates from, const LocalExpansion<double>& far, bool in_trunk) {
     const Cell& cell = targets_.cell(t);
-    const bool last = cell.is_group() || cell.is_leaf();
-    if (in_trunk && (last || cell.count <= branch_limit_)) {
+    if (in_trunk && (cell.is_group() || cell.count <= branch_limit_)) {
       const auto list = w.candidates.begin();
-      branches_.push_back({t, {list + static_cast<std::ptrdiff_t>(from.begin), list + static_cast<std::ptrdiff_t>(from.end)}, far});
+      branches_.push_back(
+          {t, {list + static_cast<std::ptrdiff_t>(from.begin), list + static_cast<std::ptrdiff_t>(from.end)}, far});
       return;
     }
-    if (last) return sum_group(w, t, from, far);
+    if (cell.is_group()) return sum_group(w, t, from, far);
     LocalExpansion<double> own = far;
     const Candidates rest = separate(w, t, from, own);
     for (std::int32_t c = cell.first_child; c < cell.first_child + cell.children; ++c) {

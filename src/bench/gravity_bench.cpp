@@ -146,7 +146,8 @@ std::vector<Setting> settings(const GravityBenchOptions& options, double softeni
 
 void run_gravity_bench(const GravityBenchOptions& options) {
   std::vector<std::int64_t> sizes = options.particles;
-  if (sizes.empty()) sizes = options.quick ? std::vector<std::int64_t>{94648} : std::vector<std::int64_t>{94648, 1000000};
+  if (sizes.empty())
+    sizes = options.quick ? std::vector<std::int64_t>{94648} : std::vector<std::int64_t>{94648, 1000000};
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
   std::FILE* table = options.json == "-" ? stderr : stdout;
   fmt::print(table, "{:<5} {:>9} {:<8} {:<16} {:>9} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "state", "particles",
@@ -158,23 +159,19 @@ void run_gravity_bench(const GravityBenchOptions& options) {
       DirectSlice slice(state, options.threads);
       for (const Setting& setting : settings(options, state.softening)) {
         const Measured m = measure(state, reference, slice, setting, options);
-        fmt::print(table, "{:<5} {:>9} {:<8} {:<16} {:>9.1f} {:>7.1f} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.2f}", name,
-                   n, setting.method, setting.name, 1e3 * m.seconds, m.direct / m.seconds, m.errors.rms, m.errors.p99,
-                   m.errors.max, m.body_momentum.value_or(NAN), 1e-9 * static_cast<double>(n * n) / m.direct);
-        fmt::print(table, "  build {:.1f} pp {:.0f} pc {:.0f} cc/p {:.2f}\n", 1e3 * m.stats.build_seconds, m.stats.pairs / double(n), m.stats.cell_interactions / double(n), m.stats.expansions / double(n));
+        fmt::print(table, "{:<5} {:>9} {:<8} {:<16} {:>9.1f} {:>7.1f} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.2f}",
+                   name, n, setting.method, setting.name, 1e3 * m.seconds, m.direct / m.seconds, m.errors.rms,
+                   m.errors.p99, m.errors.max, m.body_momentum.value_or(NAN),
+                   1e-9 * static_cast<double>(n * n) / m.direct);
+        fmt::print(table, "  build {:.1f} pp {:.0f} pc {:.0f} cc/p {:.2f}\n", 1e3 * m.stats.build_seconds,
+                   m.stats.pairs / double(n), m.stats.cell_interactions / double(n), m.stats.expansions / double(n));
         std::fflush(table);
-        nlohmann::ordered_json row{{"state", std::string(1, name)},
-                                   {"particles", n},
-                                   {"method", setting.method},
-                                   {"setting", setting.name},
-                                   {"threads", options.threads},
-                                   {"seconds", m.seconds},
-                                   {"direct_seconds", m.direct},
-                                   {"ratio_to_direct", m.direct / m.seconds},
-                                   {"rms", m.errors.rms},
-                                   {"p99", m.errors.p99},
-                                   {"max", m.errors.max},
-                                   {"net_momentum", m.stats.momentum_error}};
+        nlohmann::ordered_json row{{"state", std::string(1, name)}, {"particles", n},
+                                   {"method", setting.method},      {"setting", setting.name},
+                                   {"threads", options.threads},    {"seconds", m.seconds},
+                                   {"direct_seconds", m.direct},    {"ratio_to_direct", m.direct / m.seconds},
+                                   {"rms", m.errors.rms},           {"p99", m.errors.p99},
+                                   {"max", m.errors.max},           {"net_momentum", m.stats.momentum_error}};
         row["body_momentum"] = m.body_momentum ? nlohmann::ordered_json(*m.body_momentum) : nullptr;
         results.push_back(row);
       }
