@@ -28,7 +28,7 @@ Root common_root(ParticlesView particles, const mpi::Comm& comm) {
 // Measured in states a and b of gravity.md 3: openings of 2e-4, 6e-4, 2e-3 leave an rms error
 // of 2.9e-4, 5.4e-4, 1.3e-3; few or randomly placed particles have half as much again.
 double opening_for(const Parameters& parameters) {
-  return parameters.opening > 0.0 ? parameters.opening : 1.5e-4 * std::pow(parameters.error / 3.5e-4, 1.5);
+  return parameters.opening > 0.0 ? parameters.opening : 1.2e-4 * std::pow(parameters.error / 3.5e-4, 1.5);
 }
 
 }  // namespace

@@ -159,12 +159,10 @@ void run_gravity_bench(const GravityBenchOptions& options) {
       DirectSlice slice(state, options.threads);
       for (const Setting& setting : settings(options, state.softening)) {
         const Measured m = measure(state, reference, slice, setting, options);
-        fmt::print(table, "{:<5} {:>9} {:<8} {:<16} {:>9.1f} {:>7.1f} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.2f}",
+        fmt::print(table, "{:<5} {:>9} {:<8} {:<16} {:>9.1f} {:>7.1f} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.2f}\n",
                    name, n, setting.method, setting.name, 1e3 * m.seconds, m.direct / m.seconds, m.errors.rms,
                    m.errors.p99, m.errors.max, m.body_momentum.value_or(NAN),
                    1e-9 * static_cast<double>(n * n) / m.direct);
-        fmt::print(table, "  build {:.1f} pp {:.0f} pc {:.0f} cc/p {:.2f}\n", 1e3 * m.stats.build_seconds,
-                   m.stats.pairs / double(n), m.stats.cell_interactions / double(n), m.stats.expansions / double(n));
         std::fflush(table);
         nlohmann::ordered_json row{{"state", std::string(1, name)}, {"particles", n},
                                    {"method", setting.method},      {"setting", setting.name},
