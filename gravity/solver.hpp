@@ -19,12 +19,17 @@ struct ParticlesView {
 struct Parameters {
   double softening = 0.0;  ///< Plummer length: a pair at distance r counts with 1/sqrt(r^2 + softening^2) [m]
   Precision precision = Precision::kMixed;
+  double error = 3.5e-4;  ///< rms of |da|/|a| that is good enough
+  double opening = 0.0;   ///< tree: error allowed to one cell, as a fraction of the acceleration; 0: follows from error
 };
 
 /// What one evaluation cost and how well it conserved momentum. Seconds, pairs and bytes are this rank's.
 struct Stats {
   double seconds = 0.0;
-  double pairs = 0.0;
+  double build_seconds = 0.0;      ///< sorting, tree and moments
+  double pairs = 0.0;              ///< particle with particle
+  double cell_interactions = 0.0;  ///< particle with cell
+  double expansions = 0.0;         ///< cell with cell
   double bytes_sent = 0.0;
   Vec3d net_force_removed{};    ///< sum(m a) that was subtracted from all accelerations [N]; zero for a pairwise sum
   double momentum_error = 0.0;  ///< |sum(m a)| / sum(m |a|) over all ranks
@@ -45,8 +50,12 @@ class Solver {
   [[nodiscard]] virtual const Stats& last() const = 0;
 };
 
-/// The solver for `method`; kAuto takes the only one there is, the direct sum. Throws UsageError for kOff, for methods
-/// this program lacks and for a softening that is negative or not finite.
+/// The method kAuto stands for: the direct sum up to some thousand particles or where the error asked for is below what
+/// the tree can do, else the tree.
+GravityMethod cheapest_method(std::uint64_t all_particles, double error);
+
+/// The solver for `method`; kAuto chooses anew at each evaluation. Throws UsageError for kOff, for methods this program
+/// lacks, for a softening that is negative or not finite and for an error or opening that is not positive.
 std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& parameters, const mpi::Comm& comm,
                                     int threads);
 

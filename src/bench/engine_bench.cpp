@@ -2,14 +2,14 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "bench/cpu_time.hpp"
 #include "bench/engine_cases.hpp"
+#include "bench/json_output.hpp"
 #include "breccia/error.hpp"
 #include "breccia/isa.hpp"
 #include "breccia/precision.hpp"
@@ -18,12 +18,6 @@
 
 namespace breccia::bench {
 namespace {
-
-double user_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
-}
 
 // One sort cycle: fused steps and one in two halves around a sorting.
 void one_cycle(grid::Engine& engine, double dt, int interval) {
@@ -150,13 +144,7 @@ void run_engine_bench(const EngineBenchOptions& options) {
                                            {"instruction_set", isa_name(active_isa())},
                                            {"compiler", io::library_versions().at(1).second},
                                            {"results", results}};
-  if (options.json == "-") {
-    fmt::print("{}\n", document.dump(2));
-  } else if (!options.json.empty()) {
-    std::ofstream file(options.json);
-    file << document.dump(2) << '\n';
-    if (!file) throw IoError(options.json + ": cannot be written");
-  }
+  write_json(document, options.json);
 }
 
 }  // namespace breccia::bench

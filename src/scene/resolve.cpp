@@ -70,8 +70,9 @@ Scene resolve(Draft& draft, const Document& document, const mpi::Comm* comm) {
   scene.gravity.softening = *draft.softening;
   if (!draft.diagnostics) draft.diagnostics = scene.time.end / 200.0;
   scene.output.diagnostics_interval = *draft.diagnostics;
-  if (scene.effects.gravity == GravityMethod::kTree || scene.effects.gravity == GravityMethod::kTreePm)
-    fail(document, "effects.gravity", "this build has only the direct sum; write \"direct\", \"auto\" or \"off\"");
+  if (scene.effects.gravity == GravityMethod::kTreePm)
+    fail(document, "effects.gravity",
+         "this build has no particle mesh; write \"tree\", \"auto\", \"direct\" or \"off\"");
 
   resolve_materials(draft, scene, document);
   resolve_bodies(draft, scene, document, comm);

@@ -19,8 +19,11 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
   dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
   set_sort_interval(speeds.particle * dt_ / scene_.cell);
   if (effects.gravity) {
-    solver_ = gravity::make_solver(effects.gravity_method, {scene.gravity.softening, scene.numerics.precision}, comm,
-                                   threads);
+    const gravity::Parameters parameters{.softening = scene.gravity.softening,
+                                         .precision = scene.numerics.precision,
+                                         .error = scene.gravity.error,
+                                         .opening = scene.gravity.opening};
+    solver_ = gravity::make_solver(effects.gravity_method, parameters, comm, threads);
     evaluate_gravity();
   }
   engine_->kick_velocities(0.5 * dt_);

@@ -1,0 +1,111 @@
+#include "gravity/tree/scales.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <limits>
+#include <span>
+
+#include "gravity/tree/workspace.hpp"
+
+namespace breccia::gravity {
+namespace {
+
+// One register of targets.
+constexpr int kSamples = 16;
+
+// Cells are opened where (b + R)/D exceeds this; three quarters of the fields then are right to a percent.
+constexpr double kScaleOpening = 1.0;
+
+struct Sampling {
+  Workspace<float> work;
+  std::vector<std::int32_t> stack;
+  double sums[3][kSamples];
+};
+
+bool contains(const Cell& outer, const Cell& inner) {
+  return outer.end > outer.begin && outer.begin <= inner.begin && outer.end >= inner.end;
+}
+
+// Cells of the coarse tree as the group sees them; the coarse cell it belongs to is left out.
+void list_coarse_cells(const Tree& tree, const Cell& group, Sampling& s) {
+  const std::int64_t coarse = coarse_limit(tree.all_particles);
+  s.work.cells.clear();
+  s.stack.assign(1, 0);
+  while (!s.stack.empty()) {
+    const std::int32_t c = s.stack.back();
+    s.stack.pop_back();
+    const Cell& cell = tree.cell(c);
+    const bool own = contains(cell, group);
+    if (cell.count > coarse && !cell.is_leaf()) {
+      const Vec3d d = group.centre - cell.centre;
+      const double size = cell.radius + 0.5 * group.radius;
+      if (own || size * size >= kScaleOpening * kScaleOpening * dot(d, d)) {
+        for (int k = 0; k < cell.children; ++k) s.stack.push_back(cell.first_child + k);
+        continue;
+      }
+    }
+    if (!own) s.work.cells.push_back(c);
+  }
+}
+
+double scale_of(const Tree& tree, const Cell& group, double softening, Sampling& s) {
+  list_coarse_cells(tree, group, s);
+  double position[3][kSamples];
+  double mass[kSamples] = {};
+  for (int k = 0; k < kSamples; ++k) {
+    const Vec3d x = tree.particles.position(group.begin + k * (group.end - group.begin) / kSamples);
+    position[0][k] = x.x;
+    position[1][k] = x.y;
+    position[2][k] = x.z;
+  }
+  GroupTask<float> task{};
+  task.targets = {{position[0], position[1], position[2]}, mass};
+  task.end = kSamples;
+  task.centre = group.centre;
+  task.softening_squared = static_cast<float>(softening * softening);
+  for (int axis = 0; axis < 3; ++axis) task.acceleration[axis] = s.sums[axis];
+  for (auto& component : s.sums) std::fill(std::begin(component), std::end(component), 0.0);
+  s.work.lend_to(task, tree);
+  interaction_kernels<float>().evaluate_group(task);
+
+  double least = std::numeric_limits<double>::max();
+  for (int k = 0; k < kSamples; ++k) {
+    least = std::min(least, std::hypot(s.sums[0][k], s.sums[1][k], s.sums[2][k]));
+  }
+  return least;
+}
+
+}  // namespace
+
+std::vector<double> acceleration_scales(const Tree& tree, double softening, int threads, const mpi::Comm& comm) {
+  const std::vector<std::int32_t> groups = tree.groups();
+  std::vector<std::int32_t> targets;
+  std::copy_if(groups.begin(), groups.end(), std::back_inserter(targets),
+               [&](std::int32_t g) { return tree.cell(g).is_target; });
+  std::vector<double> of_groups(targets.size());
+  std::vector<Sampling> sampling(static_cast<std::size_t>(threads));
+#pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
+  for (std::size_t g = 0; g < targets.size(); ++g) {
+    of_groups[g] =
+        scale_of(tree, tree.cell(targets[g]), softening, sampling[static_cast<std::size_t>(omp_get_thread_num())]);
+  }
+  if (comm.size() > 1) of_groups = comm.allgather_arrays(std::span<const double>(of_groups));
+
+  std::vector<double> scales(tree.cells.size(), 0.0);
+  for (std::size_t g = 0; g < groups.size(); ++g) scales[static_cast<std::size_t>(groups[g])] = of_groups[g];
+  for (std::size_t i = tree.cells.size(); i-- > 0;) {
+    const Cell& cell = tree.cells[i];
+    if (cell.is_group()) continue;
+    double least = std::numeric_limits<double>::max();
+    for (std::int32_t c = cell.first_child; c < cell.first_child + cell.children; ++c) {
+      least = std::min(least, scales[static_cast<std::size_t>(c)]);
+    }
+    scales[i] = least;
+  }
+  return scales;
+}
+
+}  // namespace breccia::gravity
