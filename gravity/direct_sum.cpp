@@ -1,10 +1,9 @@
 #include "gravity/direct_sum.hpp"
 
 #include <algorithm>
-#include <cmath>
 
 #include "breccia/constants.hpp"
-#include "breccia/error.hpp"
+#include "gravity/evaluation.hpp"
 #include "gravity/pair_kernel.hpp"
 
 namespace breccia::gravity {
@@ -15,33 +14,6 @@ constexpr std::int64_t kSlices = 16;
 
 constexpr int kRingTag = 71;
 
-void check_sizes(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) {
-  const std::size_t n = particles.position.size();
-  if (particles.mass.size() != n || acceleration.size() != n || (!potential.empty() && potential.size() != n)) {
-    throw UsageError("gravity: positions, masses, accelerations and potentials must be equally many");
-  }
-}
-
-double heaviest(std::span<const double> mass, const mpi::Comm& comm) {
-  const double mine = mass.empty() ? 0.0 : *std::max_element(mass.begin(), mass.end());
-  const double all = comm.max(mine);
-  return all > 0.0 ? all : 1.0;
-}
-
-// |sum(m a)| / sum(m |a|) over the ranks.
-double momentum_error(ParticlesView particles, std::span<const Vec3d> acceleration, const mpi::Comm& comm) {
-  std::array<double, 4> force{};
-  for (std::size_t i = 0; i < acceleration.size(); ++i) {
-    const Vec3d f = particles.mass[i] * acceleration[i];
-    force[0] += f.x;
-    force[1] += f.y;
-    force[2] += f.z;
-    force[3] += std::sqrt(dot(f, f));
-  }
-  comm.sum(std::span<double>(force));
-  return force[3] > 0.0 ? std::hypot(force[0], force[1], force[2]) / force[3] : 0.0;
-}
-
 }  // namespace
 
 DirectSum::DirectSum(const Parameters& parameters, const mpi::Comm& comm, int threads)
@@ -49,8 +21,8 @@ DirectSum::DirectSum(const Parameters& parameters, const mpi::Comm& comm, int th
 
 void DirectSum::evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) {
   check_sizes(particles, acceleration, potential);
-  const double start = MPI_Wtime();
   stats_ = {};
+  const Stopwatch watch(stats_.seconds);
   const auto targets = static_cast<std::size_t>(padded(static_cast<std::int64_t>(particles.position.size())));
   for (std::size_t c = 0; c < 4; ++c) sums_[c].assign(c < 3 || !potential.empty() ? targets : 0, 0.0);
 
@@ -62,8 +34,7 @@ void DirectSum::evaluate(ParticlesView particles, std::span<Vec3d> acceleration,
   }
   write(particles, mass_unit, acceleration, potential);
 
-  stats_.momentum_error = momentum_error(particles, acceleration, comm_);
-  stats_.seconds = MPI_Wtime() - start;
+  book_momentum(particles, acceleration, comm_, stats_);
 }
 
 template <class Real>

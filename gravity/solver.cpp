@@ -5,6 +5,7 @@
 
 #include "breccia/error.hpp"
 #include "gravity/direct_sum.hpp"
+#include "gravity/mesh/tree_pm.hpp"
 
 namespace breccia::gravity {
 
@@ -23,7 +24,10 @@ std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& para
     case GravityMethod::kTree:
       throw UsageError("effects.gravity = tree: this version has no tree; use direct");
     case GravityMethod::kTreePm:
-      throw UsageError("effects.gravity = treepm: this version has no particle mesh; use direct");
+      if (parameters.precision == Precision::kDouble) {
+        return std::make_unique<TreePm<double>>(parameters, comm, threads);
+      }
+      return std::make_unique<TreePm<float>>(parameters, comm, threads);
   }
   throw UsageError("effects.gravity: unknown method; use direct");
 }

@@ -6,6 +6,7 @@
 
 #include "breccia/linalg.hpp"
 #include "breccia/scene.hpp"
+#include "gravity/mesh/phases.hpp"
 #include "mpi/comm.hpp"
 
 namespace breccia::gravity {
@@ -16,9 +17,19 @@ struct ParticlesView {
   std::span<const double> mass;     ///< [kg]
 };
 
+/// Of the particle mesh (gravity.md 5.3).
+struct MeshParameters {
+  double particle_spacing = 0.0;  ///< mean distance of the particles where they are dense [m]; 0: found from them
+  double cell = 0.0;              ///< [m]; 0: kCellsPerSpacing particle spacings
+  double split = 0.8;             ///< scale rs of the Gaussian split [cells]
+  double cutoff = 4.5;            ///< of the short-range part [rs]
+};
+inline constexpr double kCellsPerSpacing = 0.9;
+
 struct Parameters {
   double softening = 0.0;  ///< Plummer length: a pair at distance r counts with 1/sqrt(r^2 + softening^2) [m]
   Precision precision = Precision::kMixed;
+  MeshParameters mesh{};
 };
 
 /// What one evaluation cost and how well it conserved momentum. Seconds, pairs and bytes are this rank's.
@@ -26,6 +37,8 @@ struct Stats {
   double seconds = 0.0;
   double pairs = 0.0;
   double bytes_sent = 0.0;
+  int boxes = 0;  ///< that have a mesh
+  Phases phases;  ///< of treepm
   Vec3d net_force_removed{};    ///< sum(m a) that was subtracted from all accelerations [N]; zero for a pairwise sum
   double momentum_error = 0.0;  ///< |sum(m a)| / sum(m |a|) over all ranks
 };

@@ -1,0 +1,35 @@
+// What all solvers do before and after they sum.
+#pragma once
+
+#include <span>
+
+#include "gravity/solver.hpp"
+
+namespace breccia::gravity {
+
+/// Throws UsageError unless positions, masses, accelerations and potentials (or none) are equally many.
+void check_sizes(ParticlesView particles, std::span<const Vec3d> acceleration, std::span<const double> potential);
+
+/// Largest mass of all ranks [kg], 1 where there is none.
+double heaviest(std::span<const double> mass, const mpi::Comm& comm);
+
+/// Sets momentum_error: |sum(m a)| / sum(m |a|) over the ranks. Returns the net acceleration sum(m a)/sum(m).
+Vec3d book_momentum(ParticlesView particles, std::span<const Vec3d> acceleration, const mpi::Comm& comm, Stats& stats);
+
+/// The same, and subtracts that net acceleration from all particles.
+void remove_net_force(ParticlesView particles, std::span<Vec3d> acceleration, const mpi::Comm& comm, Stats& stats);
+
+/// Adds the wall time of its lifetime to `seconds`.
+class Stopwatch {
+ public:
+  explicit Stopwatch(double& seconds) : seconds_(seconds), start_(MPI_Wtime()) {}
+  ~Stopwatch() { seconds_ += MPI_Wtime() - start_; }
+  Stopwatch(const Stopwatch&) = delete;
+  Stopwatch& operator=(const Stopwatch&) = delete;
+
+ private:
+  double& seconds_;
+  double start_;
+};
+
+}  // namespace breccia::gravity

@@ -1,0 +1,64 @@
+#include "gravity/mesh/tree_pm.hpp"
+
+#include <algorithm>
+
+#include "breccia/constants.hpp"
+#include "gravity/evaluation.hpp"
+
+namespace breccia::gravity {
+
+template <class Real>
+TreePm<Real>::TreePm(const Parameters& parameters, const mpi::Comm& comm, int threads)
+    : parameters_(parameters),
+      comm_(comm),
+      threads_(std::max(threads, 1)),
+      spacing_(parameters.mesh.particle_spacing),
+      unsplit_(parameters, comm, threads_) {
+  for (std::size_t k = 0; k < kMostBoxes; ++k) fields_.emplace_back(comm, threads_);
+}
+
+template <class Real>
+void TreePm<Real>::evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) {
+  check_sizes(particles, acceleration, potential);
+  stats_ = {};
+  const Stopwatch watch(stats_.seconds);
+  const double mass_unit = heaviest(particles.mass, comm_);
+  stats_.phases.time(Phase::kBoxes, [&] { choose(particles); });
+
+  std::fill(acceleration.begin(), acceleration.end(), Vec3d{});
+  std::fill(potential.begin(), potential.end(), 0.0);
+  for (std::size_t k = 0; k < boxes_.size(); ++k) {
+    const BoxSettings settings{.box = boxes_[k],
+                               .cell = cell_,
+                               .spacing = spacing_,
+                               .split = parameters_.mesh.split,
+                               .cutoff = parameters_.mesh.cutoff,
+                               .softening = parameters_.softening,
+                               .mass_unit = mass_unit};
+    fields_[k].add_to(particles, set_, static_cast<std::uint8_t>(k + 1), settings, acceleration, potential, stats_);
+  }
+  stats_.phases.time(Phase::kUnsplit, [&] {
+    unsplit_.add_to(particles, set_, static_cast<int>(boxes_.size()) + 1, mass_unit, acceleration, potential, stats_);
+  });
+  remove_net_force(particles, acceleration, comm_, stats_);
+  stats_.bytes_sent += stats_.phases.bytes_sent;
+}
+
+template <class Real>
+void TreePm<Real>::choose(ParticlesView particles) {
+  if (spacing_ <= 0.0) spacing_ = dense_spacing(particles, comm_);
+  cell_ = parameters_.mesh.cell > 0.0 ? parameters_.mesh.cell : kCellsPerSpacing * spacing_;
+  boxes_ = choose_boxes(particles, spacing_, cell_, comm_);
+  stats_.boxes = static_cast<int>(boxes_.size());
+  set_.assign(particles.position.size(), 0);
+  for (std::size_t i = 0; i < set_.size(); ++i) {
+    for (std::size_t k = 0; k < boxes_.size() && set_[i] == 0; ++k) {
+      if (boxes_[k].contains(particles.position[i])) set_[i] = static_cast<std::uint8_t>(k + 1);
+    }
+  }
+}
+
+template class TreePm<float>;
+template class TreePm<double>;
+
+}  // namespace breccia::gravity
