@@ -21,27 +21,43 @@ double heaviest(std::span<const double> mass, const mpi::Comm& comm) {
   return all > 0.0 ? all : 1.0;
 }
 
-Vec3d book_momentum(ParticlesView particles, std::span<const Vec3d> acceleration, const mpi::Comm& comm, Stats& stats) {
-  std::array<double, 5> sums{};
+namespace {
+
+struct NetForce {
+  Vec3d sum{};                ///< sum(m a)
+  double sum_of_sizes = 0.0;  ///< sum(m |a|)
+};
+
+NetForce net_force(ParticlesView particles, std::span<const Vec3d> acceleration, const mpi::Comm& comm) {
+  std::array<double, 4> sums{};
   for (std::size_t i = 0; i < acceleration.size(); ++i) {
     const Vec3d f = particles.mass[i] * acceleration[i];
     sums[0] += f.x;
     sums[1] += f.y;
     sums[2] += f.z;
     sums[3] += std::sqrt(dot(f, f));
-    sums[4] += particles.mass[i];
   }
   comm.sum(std::span<double>(sums));
-  stats.momentum_error = sums[3] > 0.0 ? std::hypot(sums[0], sums[1], sums[2]) / sums[3] : 0.0;
-  return sums[4] > 0.0 ? (1.0 / sums[4]) * Vec3d{sums[0], sums[1], sums[2]} : Vec3d{};
+  return {{sums[0], sums[1], sums[2]}, sums[3]};
+}
+
+void book(const NetForce& net, Stats& stats) {
+  stats.momentum_error = net.sum_of_sizes > 0.0 ? std::sqrt(dot(net.sum, net.sum)) / net.sum_of_sizes : 0.0;
+}
+
+}  // namespace
+
+void book_momentum(ParticlesView particles, std::span<const Vec3d> acceleration, const mpi::Comm& comm, Stats& stats) {
+  book(net_force(particles, acceleration, comm), stats);
 }
 
 void remove_net_force(ParticlesView particles, std::span<Vec3d> acceleration, const mpi::Comm& comm, Stats& stats) {
-  const Vec3d net = book_momentum(particles, acceleration, comm, stats);
-  double mass = 0.0;
-  for (const double m : particles.mass) mass += m;
-  stats.net_force_removed = comm.sum(mass) * net;
-  for (Vec3d& a : acceleration) a -= net;
+  const NetForce net = net_force(particles, acceleration, comm);
+  book(net, stats);
+  if (!(net.sum_of_sizes > 0.0)) return;
+  stats.net_force_removed = net.sum;
+  const Vec3d share = (1.0 / net.sum_of_sizes) * net.sum;
+  for (Vec3d& a : acceleration) a -= std::sqrt(dot(a, a)) * share;
 }
 
 }  // namespace breccia::gravity

@@ -13,10 +13,11 @@ void check_sizes(ParticlesView particles, std::span<const Vec3d> acceleration, s
 /// Largest mass of all ranks [kg], 1 where there is none.
 double heaviest(std::span<const double> mass, const mpi::Comm& comm);
 
-/// Sets momentum_error: |sum(m a)| / sum(m |a|) over the ranks. Returns the net acceleration sum(m a)/sum(m).
-Vec3d book_momentum(ParticlesView particles, std::span<const Vec3d> acceleration, const mpi::Comm& comm, Stats& stats);
+/// Sets momentum_error: |sum(m a)| / sum(m |a|) over the ranks.
+void book_momentum(ParticlesView particles, std::span<const Vec3d> acceleration, const mpi::Comm& comm, Stats& stats);
 
-/// The same, and subtracts that net acceleration from all particles.
+/// The same, and takes the net force off the particles in proportion to m |a|: far debris that feels little is then
+/// disturbed as little, while an equal acceleration of all would drown its own.
 void remove_net_force(ParticlesView particles, std::span<Vec3d> acceleration, const mpi::Comm& comm, Stats& stats);
 
 /// Adds the wall time of its lifetime to `seconds`.

@@ -6,6 +6,7 @@
 #include "breccia/error.hpp"
 #include "gravity/direct_sum.hpp"
 #include "gravity/mesh/tree_pm.hpp"
+#include "gravity/tree/tree_solver.hpp"
 
 namespace breccia::gravity {
 
@@ -22,7 +23,7 @@ std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& para
     case GravityMethod::kOff:
       throw UsageError("effects.gravity = off: there is nothing to evaluate; use direct");
     case GravityMethod::kTree:
-      throw UsageError("effects.gravity = tree: this version has no tree; use direct");
+      return std::make_unique<TreeSolver>(parameters, comm, threads);
     case GravityMethod::kTreePm:
       if (parameters.precision == Precision::kDouble) {
         return std::make_unique<TreePm<double>>(parameters, comm, threads);

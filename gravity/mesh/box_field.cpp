@@ -20,7 +20,8 @@ void BoxField<Real>::add_to(ParticlesView particles, std::span<const std::uint8_
   phases.time(Phase::kSort, [&] {
     select(particles, set, number, geometry, settings.mass_unit);
     clusters_.build(position_, mass_, settings.spacing / settings.cell, threads_);
-    for (auto& component : field_) component.assign(static_cast<std::size_t>(clusters_.count() * kClusterSize), Real(0));
+    for (auto& component : field_)
+      component.assign(static_cast<std::size_t>(clusters_.count() * kClusterSize), Real(0));
   });
   mesh_->add_field(clusters_, field_, phases);
   stats.pairs += near_.add_field(clusters_, position_, mass_, settings.spacing / settings.cell, law_,

@@ -84,7 +84,9 @@ void BoxMesh<Real>::assign(const Clusters<Real>& own) {
   for (int sweep = 0; sweep < 2; ++sweep) {
 #pragma omp parallel for num_threads(threads_) schedule(dynamic, 1)
     for (int row = sweep; row < rows; row += 2) {
-      const auto first_cluster = [&](int r) { return columns.first[std::min(r * columns_per_row, columns.nx) * columns.ny]; };
+      const auto first_cluster = [&](int r) {
+        return columns.first[std::min(r * columns_per_row, columns.nx) * columns.ny];
+      };
       assign_masses(AssignTask<Real>{particles, first_cluster(row), first_cluster(row + 1), mass_.data(),
                                      touched_.begin, size_.nodes[1], size_.nodes[2]});
     }
@@ -95,8 +97,7 @@ template <class Real>
 void BoxMesh<Real>::exchange_and_convolve(Phases& phases) {
   const PlaneRange own = owners_[static_cast<std::size_t>(comm_.rank())];
   owned_.resize(static_cast<std::size_t>(own.count()) * plane());
-  phases.bytes_sent +=
-      add_to_owners<Real>({touched_, mass_.data()}, owners_, {own, owned_.data()}, plane(), comm_);
+  phases.bytes_sent += add_to_owners<Real>({touched_, mass_.data()}, owners_, {own, owned_.data()}, plane(), comm_);
   if (convolution_) {
     convolution_->apply(owned_.data());
     phases.bytes_sent += convolution_->bytes_sent();
@@ -112,8 +113,7 @@ void BoxMesh<Real>::interpolate_to(const Clusters<Real>& own, SlotField<Real>& f
   nodes_.resize(4 * (static_cast<std::size_t>(touched_.count()) * plane() + 1));
 #pragma omp parallel for num_threads(threads_) schedule(static)
   for (int x = 0; x < touched_.count(); ++x) {
-    take_differences(
-        DifferenceTask<Real>{potential_.data(), nodes_.data(), x, x + 1, size_.nodes[1], size_.nodes[2]});
+    take_differences(DifferenceTask<Real>{potential_.data(), nodes_.data(), x, x + 1, size_.nodes[1], size_.nodes[2]});
   }
   const ClusterArrays<Real> particles = own.arrays();
 #pragma omp parallel for num_threads(threads_) schedule(static)

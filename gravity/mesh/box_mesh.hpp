@@ -49,11 +49,11 @@ class BoxMesh {
   MPI_Comm transformers_ = MPI_COMM_NULL;  // the ranks that transform this mesh together; null on the others
   std::unique_ptr<Convolution<Real>> convolution_;
   std::vector<PlaneRange> owners_;
-  PlaneRange touched_;                // planes the own particles reach
-  AlignedVector<Real> mass_;          // on touched_
-  AlignedVector<Real> owned_;         // mass, then potential, on the planes this rank transforms
-  AlignedVector<Real> potential_;     // on touched_ and 3 planes on both sides
-  AlignedVector<Real> nodes_;         // acceleration and potential on touched_
+  PlaneRange touched_;             // planes the own particles reach
+  AlignedVector<Real> mass_;       // on touched_
+  AlignedVector<Real> owned_;      // mass, then potential, on the planes this rank transforms
+  AlignedVector<Real> potential_;  // on touched_ and 3 planes on both sides
+  AlignedVector<Real> nodes_;      // acceleration and potential on touched_
 };
 
 }  // namespace breccia::gravity

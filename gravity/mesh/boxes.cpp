@@ -83,7 +83,8 @@ Blocks count_blocks(ParticlesView particles, double width, const mpi::Comm& comm
   }
   if (comm.size() == 1) return own;
   Blocks blocks;
-  for (const Block& b : comm.allgather_arrays<Block>(own.all())) blocks.at(b.x, b.y, b.z).add(b.count, b.mass, b.bounds);
+  for (const Block& b : comm.allgather_arrays<Block>(own.all()))
+    blocks.at(b.x, b.y, b.z).add(b.count, b.mass, b.bounds);
   return blocks;
 }
 

@@ -20,8 +20,7 @@ double component(Vec3d v, int axis) { return axis == 0 ? v.x : axis == 1 ? v.y :
 }  // namespace
 
 template <class Real>
-void Clusters<Real>::build(std::span<const Vec3d> position, std::span<const double> mass, double spacing,
-                           int threads) {
+void Clusters<Real>::build(std::span<const Vec3d> position, std::span<const double> mass, double spacing, int threads) {
   lay_columns(position, spacing);
   sort(position, threads);
 

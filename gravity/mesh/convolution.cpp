@@ -43,8 +43,7 @@ PlaneRange share_of_planes(int planes, int ranks, int rank) {
 }
 
 template <class Real>
-Convolution<Real>::Convolution(const MeshSize& size, const Kernel& kernel, const mpi::Comm& comm,
-                               int threads)
+Convolution<Real>::Convolution(const MeshSize& size, const Kernel& kernel, const mpi::Comm& comm, int threads)
     : size_(size),
       comm_(comm),
       threads_(std::max(threads, 1)),

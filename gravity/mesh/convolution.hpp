@@ -49,8 +49,8 @@ class Convolution {
   FftPlan<Real> real_to_z_, z_to_real_, forward_y_, backward_y_, forward_x_, backward_x_;
   AlignedVector<Real> kernel_;  // (folded y wave number from first_folded_, x wave number to padded/2, half)
   int first_folded_ = 0;
-  AlignedVector<Complex> by_x_;  // (y wave number, own x, half): what the x planes give and take
-  AlignedVector<Complex> by_y_;  // (own y wave number, x, half)
+  AlignedVector<Complex> by_x_;               // (y wave number, own x, half): what the x planes give and take
+  AlignedVector<Complex> by_y_;               // (own y wave number, x, half)
   std::vector<AlignedVector<Complex>> work_;  // one (padded y or x, half) per thread
 };
 

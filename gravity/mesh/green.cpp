@@ -27,7 +27,8 @@ void transform_plane(const MeshSize& size, const Kernel& kernel, int x, const Ff
     auto* row = reinterpret_cast<double*>(row_at(plane, y, half));
     for (int z = 0; z < half; ++z) row[z] = kernel(x, y, z);
     for (int z = half; z < padded[2]; ++z) row[z] = row[padded[2] - z];
-    if (y > 0 && y < padded[1] - y) std::copy_n(row, padded[2], reinterpret_cast<double*>(row_at(plane, padded[1] - y, half)));
+    if (y > 0 && y < padded[1] - y)
+      std::copy_n(row, padded[2], reinterpret_cast<double*>(row_at(plane, padded[1] - y, half)));
   }
   over_z(plane.data());
   over_y(plane.data());
@@ -72,7 +73,8 @@ std::vector<double> transformed_kernel(const MeshSize& size, const Kernel& kerne
     over_x(plane.data());
     for (int x = 0; x < x_count; ++x) {
       const Complex* from = row_at(plane, x, half);
-      for (std::size_t z = 0; z < stride; ++z) row[static_cast<std::size_t>(x) * stride + z] = normalisation * from[z].real();
+      for (std::size_t z = 0; z < stride; ++z)
+        row[static_cast<std::size_t>(x) * stride + z] = normalisation * from[z].real();
     }
   }
   return values;

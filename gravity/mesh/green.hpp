@@ -24,7 +24,9 @@ struct PlaneRange {
 using Kernel = std::function<double(int, int, int)>;
 
 /// Wave numbers n and padded - n have the same kernel; this is the lower one.
-inline int folded(int wave_number, int padded) { return wave_number < padded - wave_number ? wave_number : padded - wave_number; }
+inline int folded(int wave_number, int padded) {
+  return wave_number < padded - wave_number ? wave_number : padded - wave_number;
+}
 
 /// The transform over padded points per axis, normalised for a forward and a backward transform of the data: (y wave
 /// numbers of `rows`, all <= padded/2, x wave numbers to padded/2, z wave numbers to padded/2). In double, because the

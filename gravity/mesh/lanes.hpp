@@ -39,8 +39,8 @@ BRECCIA_HD void store_selected(unsigned selected, V value, typename V::Scalar* t
 #if defined(__AVX512F__)
   // Compressed in a register, then stored whole: compressing stores are slow on some processors.
   if constexpr (std::is_same_v<typename V::Scalar, float>) {
-    _mm512_storeu_ps(
-        to, _mm512_maskz_compress_ps(static_cast<__mmask16>(selected), __builtin_bit_cast(__m512, value.v)));
+    _mm512_storeu_ps(to,
+                     _mm512_maskz_compress_ps(static_cast<__mmask16>(selected), __builtin_bit_cast(__m512, value.v)));
   } else {
     _mm512_storeu_pd(to,
                      _mm512_maskz_compress_pd(static_cast<__mmask8>(selected), __builtin_bit_cast(__m512d, value.v)));

@@ -19,17 +19,17 @@
 #define BRECCIA_CALL_V2(call) static_cast<void>(0)
 #endif
 
-#define BRECCIA_DISPATCH(call)  \
-  switch (active_isa()) {       \
-    case Isa::kV4:              \
-      BRECCIA_CALL_V4(call);    \
-      break;                    \
-    case Isa::kV3:              \
-      BRECCIA_CALL_V3(call);    \
-      break;                    \
-    case Isa::kV2:              \
-      BRECCIA_CALL_V2(call);    \
-      break;                    \
+#define BRECCIA_DISPATCH(call) \
+  switch (active_isa()) {      \
+    case Isa::kV4:             \
+      BRECCIA_CALL_V4(call);   \
+      break;                   \
+    case Isa::kV3:             \
+      BRECCIA_CALL_V3(call);   \
+      break;                   \
+    case Isa::kV2:             \
+      BRECCIA_CALL_V2(call);   \
+      break;                   \
   }
 
 namespace breccia::gravity {

@@ -26,7 +26,7 @@ struct DifferenceTask {
   const Real* potential;  ///< (3 planes before `begin` to 3 planes after `end`, ny, nz)
   Real* field;            ///< (planes, ny, nz, 4): acceleration and potential; 3 nodes from the faces of y, z on
   int begin, end;         ///< planes of `field` to be written, counted from its first
-  int ny, nz;      ///< nz >= kLeastNodes
+  int ny, nz;             ///< nz >= kLeastNodes
 };
 
 /// Adds what clusters [begin, end) feel from the nodes, by the weights of the assignment.
@@ -49,14 +49,14 @@ struct NearTask {
   ClusterArrays<Real> sources;
   ClusterColumns columns;  ///< of the sources
   const ShortRange<Real>* law;
-  Real* result[4];  ///< acceleration and potential of each target slot; potential null: not wanted
+  Real* result[4];      ///< acceleration and potential of each target slot; potential null: not wanted
   std::int64_t* pairs;  ///< pairs evaluated are added here
 };
 
-#define BRECCIA_DECLARE_MESH_KERNELS(Real)         \
-  void assign_masses(const AssignTask<Real>&);     \
+#define BRECCIA_DECLARE_MESH_KERNELS(Real)            \
+  void assign_masses(const AssignTask<Real>&);        \
   void take_differences(const DifferenceTask<Real>&); \
-  void interpolate(const InterpolateTask<Real>&);  \
+  void interpolate(const InterpolateTask<Real>&);     \
   void sum_near(const NearTask<Real>&);
 
 namespace isa_v2 {

@@ -31,7 +31,8 @@ double NearField<Real>::add_field(const Clusters<Real>& own, std::span<const Vec
                                   bool with_potential, SlotField<Real>& field, Phases& phases) {
   double pairs = 0.0;
   phases.time(Phase::kNear, [&] {
-    if (comm_.size() > 1) fetch_halo(position, mass, std::sqrt(static_cast<double>(law.cutoff_squared)), spacing, phases);
+    if (comm_.size() > 1)
+      fetch_halo(position, mass, std::sqrt(static_cast<double>(law.cutoff_squared)), spacing, phases);
     pairs = add_from(own, own, law, with_potential, field);
     if (halo_.count() > 0) pairs += add_from(halo_, own, law, with_potential, field);
   });
@@ -76,15 +77,15 @@ double NearField<Real>::add_from(const Clusters<Real>& sources, const Clusters<R
 #pragma omp parallel for num_threads(threads_) schedule(dynamic, 1) reduction(+ : pairs)
   for (std::int64_t begin = 0; begin < targets.count; begin += kClusterGroup) {
     std::int64_t count = 0;
-    sum_near(NearTask<Real>{
-        targets,
-        begin,
-        std::min(begin + kClusterGroup, targets.count),
-        source_arrays,
-        columns,
-        &law,
-        {field[0].data(), field[1].data(), field[2].data(), with_potential ? field[3].data() : nullptr},
-        &count});
+    sum_near(
+        NearTask<Real>{targets,
+                       begin,
+                       std::min(begin + kClusterGroup, targets.count),
+                       source_arrays,
+                       columns,
+                       &law,
+                       {field[0].data(), field[1].data(), field[2].data(), with_potential ? field[3].data() : nullptr},
+                       &count});
     pairs += count;
   }
   return static_cast<double>(pairs);

@@ -69,8 +69,7 @@ BRECCIA_HD void append(const NearTask<Real>& task, const TargetBox<Real>& box, s
     const V dx = beyond(x, broadcast<V>(box.half[0]));
     const V dy = beyond(y, broadcast<V>(box.half[1]));
     const V dz = beyond(z, broadcast<V>(box.half[2]));
-    const unsigned chosen =
-        bits((dx * dx + (dy * dy + dz * dz) < broadcast<V>(box.reach_squared)) & (mass > V{}));
+    const unsigned chosen = bits((dx * dx + (dy * dy + dz * dz) < broadcast<V>(box.reach_squared)) & (mass > V{}));
     store_selected(chosen, x, list.x + list.count);
     store_selected(chosen, y, list.y + list.count);
     store_selected(chosen, z, list.z + list.count);
@@ -122,8 +121,8 @@ struct PairLoop {
   }
 
   // The clusters [first, last) of one column.
-  BRECCIA_HD void search_column(const TargetBox<Real>& box, std::int64_t first, std::int64_t last,
-                                std::int64_t cluster, SourceList<Real>& list) const {
+  BRECCIA_HD void search_column(const TargetBox<Real>& box, std::int64_t first, std::int64_t last, std::int64_t cluster,
+                                SourceList<Real>& list) const {
     for (std::int64_t c = first; c < last; c += V::kLanes) {
       V distance2{};
       for (int axis = 0; axis < 3; ++axis) {

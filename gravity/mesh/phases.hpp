@@ -10,7 +10,7 @@ namespace breccia::gravity {
 enum class Phase { kBoxes, kSort, kAssign, kTransform, kInterpolate, kNear, kUnsplit, kCount };
 inline constexpr int kPhases = static_cast<int>(Phase::kCount);
 inline constexpr std::array<const char*, kPhases> kPhaseNames{"boxes",       "sort",       "assign", "transform",
-                                                             "interpolate", "near field", "tree"};
+                                                              "interpolate", "near field", "tree"};
 
 struct Phases {
   std::array<double, kPhases> seconds{};

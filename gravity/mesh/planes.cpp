@@ -62,7 +62,8 @@ template <class Real>
 double fetch_from_owners(PlaneStack<const Real> owned, std::span<const PlaneRange> owners, PlaneStack<Real> mine,
                          std::size_t plane, const mpi::Comm& comm) {
   const bool here = overlap(mine.range, owned.range).count() == mine.range.count();
-  if (here && mine.range.count() > 0) std::copy_n(at(owned, mine.range.begin, plane), values_in(mine.range, plane), mine.values);
+  if (here && mine.range.count() > 0)
+    std::copy_n(at(owned, mine.range.begin, plane), values_in(mine.range, plane), mine.values);
   const std::vector<PlaneRange> wanted = comm.allgather(here ? PlaneRange{} : mine.range);
   const auto to = packed(owned, wanted, plane);
   const auto from = comm.alltoall(to);

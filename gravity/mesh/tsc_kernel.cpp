@@ -96,9 +96,8 @@ void interpolate_as(const InterpolateTask<Real>& task) {
 template <class V>
 BRECCIA_HD V minus_derivative(const typename V::Scalar* at, std::int64_t stride) {
   using Real = typename V::Scalar;
-  const auto pair = [&](std::int64_t k) BRECCIA_INLINE_LAMBDA {
-    return V::load(at - k * stride) - V::load(at + k * stride);
-  };
+  const auto pair = [&](std::int64_t k)
+                        BRECCIA_INLINE_LAMBDA { return V::load(at - k * stride) - V::load(at + k * stride); };
   return V(Real(0.75)) * pair(1) - V(Real(0.15)) * pair(2) + V(Real(1.0 / 60.0)) * pair(3);
 }
 

@@ -1,43 +1,40 @@
 #include "gravity/mesh/unsplit.hpp"
 
 #include <algorithm>
-#include <vector>
+#include <cmath>
 
 #include "breccia/constants.hpp"
-#include "gravity/pair_kernel.hpp"
+#include "gravity/tree/scales.hpp"
 
 namespace breccia::gravity {
 namespace {
 
-struct Subset {
-  std::vector<std::size_t> index;
-  std::vector<Vec3d> position;
-  std::vector<double> mass;
-
-  void add(ParticlesView particles, std::size_t i) {
-    index.push_back(i);
-    position.push_back(particles.position[i]);
-    mass.push_back(particles.mass[i]);
-  }
+struct Traveller {
+  Vec3d position;
+  double mass;
+  std::uint8_t set;
 };
 
-// Direct sums in double over all sources, those of set 0 among themselves included.
-void add_pairs(const Subset& targets, const Subset& sources, bool same, const Parameters& parameters, double mass_unit,
-               int threads, std::vector<double> (&sums)[4]) {
-  Points<float> to, from;
-  to.fill({targets.position, targets.mass}, mass_unit);
-  from.fill({sources.position, sources.mass}, mass_unit);
-  const std::int64_t groups = padded(static_cast<std::int64_t>(targets.index.size())) / kTargetGroup;
-#pragma omp parallel for num_threads(threads) schedule(static)
-  for (std::int64_t group = 0; group < groups; ++group) {
-    sum_pairs(PairTask<float>{.targets = to.arrays(),
-                              .begin = group * kTargetGroup,
-                              .end = (group + 1) * kTargetGroup,
-                              .sources = from.arrays(),
-                              .same = same,
-                              .softening_squared = static_cast<float>(parameters.softening * parameters.softening),
-                              .acceleration = {sums[0].data(), sums[1].data(), sums[2].data()},
-                              .potential = sums[3].empty() ? nullptr : sums[3].data()});
+// Only cells with particles of this rank are targets here.
+void mark_targets(Tree& tree, const std::vector<std::int64_t>& owned) {
+  std::vector<std::int32_t> before(owned.size() + 1, 0);
+  for (std::size_t k = 0; k < owned.size(); ++k) {
+    before[k + 1] = before[k] + (owned[static_cast<std::size_t>(tree.particles.order[k])] >= 0 ? 1 : 0);
+  }
+  for (Cell& cell : tree.cells) {
+    cell.is_target = before[static_cast<std::size_t>(cell.end)] > before[static_cast<std::size_t>(cell.begin)];
+  }
+}
+
+// Errors at a cell may also be weighed against what the whole of another set does there.
+void raise_scales(const Tree& tree, const Tree& other, std::vector<double>& scales) {
+  if (other.cells.empty()) return;
+  const Cell& all = other.cells[0];
+  for (std::size_t c = 0; c < scales.size(); ++c) {
+    const Vec3d d = tree.cells[c].centre - all.centre;
+    const double farthest = std::sqrt(dot(d, d)) + tree.cells[c].radius;
+    // Inside the other set the pull of the whole says nothing.
+    if (farthest > all.radius) scales[c] = std::max(scales[c], all.moments.mass / (farthest * farthest));
   }
 }
 
@@ -45,37 +42,86 @@ void add_pairs(const Subset& targets, const Subset& sources, bool same, const Pa
 
 void UnsplitField::add_to(ParticlesView particles, std::span<const std::uint8_t> set, int sets, double mass_unit,
                           std::span<Vec3d> acceleration, std::span<double> potential, Stats& stats) {
-  std::vector<Subset> subsets(static_cast<std::size_t>(sets));
-  for (std::size_t i = 0; i < set.size(); ++i) subsets[set[i]].add(particles, i);
-  const double unit = kGravitationalConstant * mass_unit;
-  for (std::size_t target = 0; target < subsets.size(); ++target) {
-    const Subset& t = subsets[target];
-    std::vector<double> sums[4];
-    for (std::size_t c = 0; c < 4; ++c) {
-      sums[c].assign(c < 3 || !potential.empty() ? static_cast<std::size_t>(padded(static_cast<std::int64_t>(t.index.size()))) : 0, 0.0);
+  const bool outside = comm_.any(std::find(set.begin(), set.end(), std::uint8_t{0}) != set.end());
+  if (!outside && sets <= 2) return;
+  sets_.resize(static_cast<std::size_t>(sets));
+  gather(particles, set, stats);
+  grow_trees(mass_unit, !potential.empty());
+
+  const double unit = kGravitationalConstant * mass_unit / root_.unit;
+  for (std::size_t target = 0; target < sets_.size(); ++target) {
+    walk_all(target, stats);
+    const Set& s = sets_[target];
+    for (std::size_t k = 0; k < s.owned.size(); ++k) {
+      const std::int64_t owned = s.owned[static_cast<std::size_t>(s.tree.particles.order[k])];
+      if (owned < 0) continue;
+      const auto i = static_cast<std::size_t>(owned);
+      acceleration[i] +=
+          (unit / root_.unit) * Vec3d{s.sums.acceleration[0][k], s.sums.acceleration[1][k], s.sums.acceleration[2][k]};
+      if (!potential.empty()) potential[i] += unit * s.sums.potential[k];
     }
-    for (std::size_t source = 0; source < subsets.size(); ++source) {
-      if (source == target && target > 0) continue;
-      const Subset& own = subsets[source];
-      add_pairs(t, own, source == target, parameters_, mass_unit, threads_, sums);
-      stats.pairs += static_cast<double>(t.index.size()) * static_cast<double>(own.index.size());
-      if (comm_.size() == 1) continue;
-      Subset others;
-      const std::vector<std::int64_t> counts = comm_.allgather(static_cast<std::int64_t>(own.index.size()));
-      const std::vector<Vec3d> all_positions = comm_.allgather_arrays<Vec3d>(own.position);
-      const std::vector<double> all_masses = comm_.allgather_arrays<double>(own.mass);
-      std::size_t at = 0;
-      for (std::size_t r = 0; r < counts.size(); ++r) {
-        for (std::int64_t i = 0; i < counts[r]; ++i, ++at) {
-          if (static_cast<int>(r) != comm_.rank()) others.add({all_positions, all_masses}, at);
-        }
-      }
-      add_pairs(t, others, false, parameters_, mass_unit, threads_, sums);
+  }
+}
+
+void UnsplitField::gather(ParticlesView particles, std::span<const std::uint8_t> set, Stats& stats) {
+  for (Set& s : sets_) {
+    s.position.clear();
+    s.mass.clear();
+    s.owned.clear();
+  }
+  const auto add = [&](const Traveller& t, std::int64_t owned) {
+    Set& s = sets_[t.set];
+    s.position.push_back(t.position);
+    s.mass.push_back(t.mass);
+    s.owned.push_back(owned);
+  };
+  std::vector<Traveller> own;
+  for (std::size_t i = 0; i < set.size(); ++i) own.push_back({particles.position[i], particles.mass[i], set[i]});
+  const std::vector<std::int64_t> counts = comm_.allgather(static_cast<std::int64_t>(own.size()));
+  const std::vector<Traveller> all = comm_.size() > 1 ? comm_.allgather_arrays<Traveller>(own) : own;
+  std::size_t at = 0;
+  for (std::size_t r = 0; r < counts.size(); ++r) {
+    for (std::int64_t i = 0; i < counts[r]; ++i) add(all[at++], static_cast<int>(r) == comm_.rank() ? i : -1);
+  }
+  stats.bytes_sent += static_cast<double>(own.size() * sizeof(Traveller)) * (comm_.size() - 1);
+
+  Vec3d low = all.empty() ? Vec3d{} : all[0].position;
+  Vec3d high = low;
+  for (const Traveller& t : all) {
+    low = {std::min(low.x, t.position.x), std::min(low.y, t.position.y), std::min(low.z, t.position.z)};
+    high = {std::max(high.x, t.position.x), std::max(high.y, t.position.y), std::max(high.z, t.position.z)};
+  }
+  root_ = random_root(low, high);
+}
+
+void UnsplitField::grow_trees(double mass_unit, bool with_potential) {
+  for (Set& s : sets_) {
+    s.tree.sort(root_, {s.position, s.mass}, mass_unit, threads_);
+    s.tree.build(threads_);
+    mark_targets(s.tree, s.owned);
+    s.scales = acceleration_scales(s.tree, parameters_.softening / root_.unit, threads_);
+    s.sums.reset(s.tree.particles.size(), with_potential);
+  }
+  for (Set& s : sets_) {
+    for (const Set& other : sets_) {
+      if (&other != &s) raise_scales(s.tree, other.tree, s.scales);
     }
-    for (std::size_t k = 0; k < t.index.size(); ++k) {
-      acceleration[t.index[k]] += unit * Vec3d{sums[0][k], sums[1][k], sums[2][k]};
-      if (!potential.empty()) potential[t.index[k]] += unit * sums[3][k];
-    }
+  }
+}
+
+void UnsplitField::walk_all(std::size_t target, Stats& stats) {
+  Set& s = sets_[target];
+  const WalkSettings settings{parameters_.opening, parameters_.softening / root_.unit, threads_};
+  for (std::size_t source = 0; source < sets_.size(); ++source) {
+    if (source == target && target > 0) continue;
+    const Tree& from = sets_[source].tree;
+    if (s.tree.cells.empty() || from.cells.empty() || !s.tree.cells[0].is_target) continue;
+    const InteractionCounts counts = parameters_.precision == Precision::kMixed
+                                         ? walk<float>(s.tree, s.scales, from, settings, s.sums)
+                                         : walk<double>(s.tree, s.scales, from, settings, s.sums);
+    stats.pairs += counts.pairs;
+    stats.cell_interactions += counts.cells;
+    stats.expansions += counts.expansions;
   }
 }
 

@@ -1,15 +1,14 @@
 #include "bench/engine_bench.hpp"
 
 #include <fmt/format.h>
-#include <sys/resource.h>
 
 #include <algorithm>
 #include <cmath>
-#include <fstream>
 #include <nlohmann/json.hpp>
 
+#include "bench/cpu_time.hpp"
+#include "bench/json_output.hpp"
 #include "breccia/constants.hpp"
-#include "breccia/error.hpp"
 #include "breccia/isa.hpp"
 #include "breccia/precision.hpp"
 #include "io/machine.hpp"
@@ -53,12 +52,6 @@ struct Case {
 };
 constexpr Case kCases[] = {{"paper", 47324, 1.412}, {"cell8_1e6", 500000, 8.0}};
 
-double user_seconds() {
-  rusage usage{};
-  getrusage(RUSAGE_SELF, &usage);
-  return static_cast<double>(usage.ru_utime.tv_sec) + 1e-6 * static_cast<double>(usage.ru_utime.tv_usec);
-}
-
 // One sort cycle: 31 fused steps and one in two halves around a sorting.
 void one_cycle(grid::Engine& engine, double dt, int interval) {
   for (int n = 1; n < interval; ++n) {
@@ -91,11 +84,11 @@ Measured measure(const Case& c, Precision precision, int threads, double seconds
   Measured best;
   double spent = 0.0;
   for (int cycle = 0; cycle < 3 || spent < seconds; ++cycle) {
-    const double user = user_seconds();
-    const double wall = MPI_Wtime();
+    const Timing start = now();
     one_cycle(*engine, dt, interval);
-    const double elapsed = MPI_Wtime() - wall;
-    best.rate = std::max(best.rate, steps / (user_seconds() - user));
+    const Timing end = now();
+    const double elapsed = end.wall - start.wall;
+    best.rate = std::max(best.rate, steps / (end.user - start.user));
     best.wall_rate = std::max(best.wall_rate, steps / elapsed);
     spent += elapsed;
   }
@@ -135,13 +128,7 @@ void run_engine_bench(const EngineBenchOptions& options) {
       }
     }
   }
-  if (options.json == "-") {
-    fmt::print("{}\n", results.dump(2));
-  } else if (!options.json.empty()) {
-    std::ofstream file(options.json);
-    file << results.dump(2) << '\n';
-    if (!file) throw IoError(options.json + ": cannot be written");
-  }
+  write_json(results, options.json);
 }
 
 }  // namespace breccia::bench

@@ -1,0 +1,196 @@
+#include "breccia/pack.hpp"
+#include "gravity/rsqrt.hpp"
+#include "gravity/tree/interactions.hpp"
+#include "gravity/tree/pair_loop.hpp"
+
+namespace breccia::gravity::BRECCIA_ISA {
+namespace {
+
+// Square of the distance below which two particles without softening count as one: q^3 must stay finite.
+template <class Real>
+constexpr Real kCoincidentSquared = std::is_same_v<Real, float> ? Real(1e-24) : Real(1e-100);
+
+// Sums of the targets of one group, in double.
+struct Sums {
+  double* acceleration[3];
+  double* potential;
+
+  template <class V>
+  BRECCIA_HD void add(std::int64_t i, Vec3<V> a) const {
+    add_to(acceleration[0] + i, a.x);
+    add_to(acceleration[1] + i, a.y);
+    add_to(acceleration[2] + i, a.z);
+  }
+};
+
+// Coordinates relative to `centre` of particles [begin, end), written from `to` on; `stride` apart by component.
+template <class Real>
+void copy_relative(const MassArrays& from, std::int64_t begin, std::int64_t end, Vec3d centre, Real* to,
+                   std::int64_t stride, bool low) {
+  const double origin[3] = {centre.x, centre.y, centre.z};
+  for (int axis = 0; axis < 3; ++axis) {
+    const double* x = from.position[axis] + begin;
+    Real* high = to + axis * stride;
+    const double o = origin[axis];
+    for (std::int64_t k = 0; k < end - begin; ++k) high[k] = static_cast<Real>(x[k] - o);
+    if (!low) continue;
+    Real* rest = to + (3 + axis) * stride;
+    for (std::int64_t k = 0; k < end - begin; ++k) {
+      rest[k] = static_cast<Real>((x[k] - o) - static_cast<double>(high[k]));
+    }
+  }
+}
+
+template <class Real>
+Relative<Real> relative(const Real* first, std::int64_t stride, const Real* mass) {
+  return {{first, first + stride, first + 2 * stride}, {first + 3 * stride, first + 4 * stride, first + 5 * stride},
+          mass};
+}
+
+template <class V, bool kPotential>
+void add_far(const LocalExpansion<double>& far, const Relative<typename V::Scalar>& targets, std::int64_t padded,
+             const Sums& sums) {
+  using Real = typename V::Scalar;
+  LocalExpansion<V> l;
+  for_each_coefficient(l, far, [](V& to, double from) BRECCIA_INLINE_LAMBDA { to = V(static_cast<Real>(from)); });
+  for (std::int64_t i = 0; i < padded; i += V::kLanes) {
+    const Vec3<V> r{V::load(targets.high[0] + i), V::load(targets.high[1] + i), V::load(targets.high[2] + i)};
+    const PointField<V> field = evaluate(l, r);
+    sums.add(i, field.gradient);
+    if constexpr (kPotential) add_to(sums.potential + i, -field.value);
+  }
+}
+
+template <class V>
+BRECCIA_HD Moments<V> moments_of(const CellArrays<typename V::Scalar>& cells, std::int64_t k) {
+  const auto c = [&](int i) BRECCIA_INLINE_LAMBDA { return V(cells.component[i][k]); };
+  return {c(3), {c(4), c(5), c(6), c(7), c(8), c(9)}};
+}
+
+template <class V, bool kPotential>
+void add_cells(const CellArrays<typename V::Scalar>& cells, const Relative<typename V::Scalar>& targets,
+               std::int64_t padded, V softening_squared, const Sums& sums) {
+  for (std::int64_t begin = 0; begin < cells.count; begin += kSourceBlock) {
+    const std::int64_t end = begin + kSourceBlock < cells.count ? begin + kSourceBlock : cells.count;
+    for (std::int64_t i = 0; i < padded; i += V::kLanes) {
+      const Vec3<V> r{V::load(targets.high[0] + i), V::load(targets.high[1] + i), V::load(targets.high[2] + i)};
+      Vec3<V> acceleration{};
+      V potential{};
+      for (std::int64_t k = begin; k < end; ++k) {
+        const Vec3<V> x{r.x - V(cells.component[0][k]), r.y - V(cells.component[1][k]), r.z - V(cells.component[2][k])};
+        const V q = rsqrt(dot(x, x) + softening_squared);
+        const PointField<V> field = field_of(moments_of<V>(cells, k), x, q);
+        acceleration += field.gradient;
+        if constexpr (kPotential) potential -= field.value;
+      }
+      sums.add(i, acceleration);
+      if constexpr (kPotential) add_to(sums.potential + i, potential);
+    }
+  }
+}
+
+template <class V, bool kLow, bool kPotential, bool kSelf, class Pair>
+void add_sources(const Relative<typename V::Scalar>& targets, std::int64_t padded,
+                 const Relative<typename V::Scalar>& sources, std::int64_t first, std::int64_t last, const Pair& pair,
+                 const Sums& sums) {
+  for (std::int64_t begin = first; begin < last; begin += kSourceBlock) {
+    const std::int64_t end = begin + kSourceBlock < last ? begin + kSourceBlock : last;
+    for (std::int64_t i = 0; i < padded; i += V::kLanes) {
+      const PairSums<V> s = sum_pairs_of<V, kLow, kPotential, kSelf>(targets, i, sources, begin, end, pair);
+      sums.add(i, s.acceleration);
+      if constexpr (kPotential) add_to(sums.potential + i, s.potential);
+    }
+  }
+}
+
+template <class V, bool kLow, bool kPotential, bool kGuarded>
+void add_particles(const GroupTask<typename V::Scalar>& task, const Relative<typename V::Scalar>& targets,
+                   std::int64_t padded, typename V::Scalar* memory, const Sums& sums) {
+  using Real = typename V::Scalar;
+  std::int64_t total = 0;
+  for (std::int64_t r = 0; r < task.range_count; ++r) total += task.ranges[r].end - task.ranges[r].begin;
+  Real* mass = memory + 6 * total;
+  std::int64_t at = 0;
+  for (std::int64_t r = 0; r < task.range_count; ++r) {
+    const Range range = task.ranges[r];
+    copy_relative(task.sources, range.begin, range.end, task.centre, memory + at, total, kLow);
+    for (std::int64_t j = range.begin; j < range.end; ++j) mass[at++] = static_cast<Real>(task.sources.mass[j]);
+  }
+  const Relative<Real> sources = relative<Real>(memory, total, mass);
+  const NewtonPair<V, kGuarded> pair{V(task.softening_squared), V(kCoincidentSquared<Real>)};
+  std::int64_t others = 0;
+  if constexpr (kPotential && !kGuarded) {
+    if (task.self) {
+      others = task.end - task.begin;
+      add_sources<V, kLow, kPotential, true>(targets, padded, sources, 0, others, pair, sums);
+    }
+  }
+  add_sources<V, kLow, kPotential, false>(targets, padded, sources, others, total, pair, sums);
+}
+
+template <class V, bool kPotential>
+void evaluate_as(const GroupTask<typename V::Scalar>& task) {
+  using Real = typename V::Scalar;
+  const std::int64_t count = task.end - task.begin;
+  const std::int64_t padded = lane_padded(count);
+  const bool low = task.split_coordinates && std::is_same_v<Real, float>;
+  for (std::int64_t k = 0; k < 6 * padded; ++k) task.reals[k] = Real(0);
+  for (std::int64_t k = 0; k < 4 * padded; ++k) task.doubles[k] = 0.0;
+  copy_relative(task.targets, task.begin, task.end, task.centre, task.reals, padded, low);
+  const Relative<Real> targets = relative<Real>(task.reals, padded, nullptr);
+  const Sums sums{{task.doubles, task.doubles + padded, task.doubles + 2 * padded}, task.doubles + 3 * padded};
+  Real* memory = task.reals + 6 * padded;
+
+  if (task.far != nullptr) add_far<V, kPotential>(*task.far, targets, padded, sums);
+  add_cells<V, kPotential>(task.cells, targets, padded, V(task.softening_squared), sums);
+  const bool guarded = task.softening_squared <= kCoincidentSquared<Real>;
+  if (low) {
+    if constexpr (std::is_same_v<Real, float>) {
+      guarded ? add_particles<V, true, kPotential, true>(task, targets, padded, memory, sums)
+              : add_particles<V, true, kPotential, false>(task, targets, padded, memory, sums);
+    }
+  } else {
+    guarded ? add_particles<V, false, kPotential, true>(task, targets, padded, memory, sums)
+            : add_particles<V, false, kPotential, false>(task, targets, padded, memory, sums);
+  }
+  for (int axis = 0; axis < 3; ++axis) {
+    for (std::int64_t k = 0; k < count; ++k) task.acceleration[axis][task.begin + k] += sums.acceleration[axis][k];
+  }
+  if constexpr (kPotential) {
+    for (std::int64_t k = 0; k < count; ++k) task.potential[task.begin + k] += sums.potential[k];
+  }
+}
+
+template <class Real>
+void evaluate_task(const GroupTask<Real>& task) {
+  using V = RegisterPack<Real>;
+  task.potential != nullptr ? evaluate_as<V, true>(task) : evaluate_as<V, false>(task);
+}
+
+template <class Real>
+void expand_task(const ExpansionTask<Real>& task) {
+  using V = RegisterPack<Real>;
+  const auto load = [&](int c, std::int64_t k)
+                        BRECCIA_INLINE_LAMBDA { return V::load(task.cells.component[c] + k); };
+  LocalExpansion<V> l{};
+  for (std::int64_t k = 0; k < task.cells.count; k += V::kLanes) {
+    const Vec3<V> x{-load(0, k), -load(1, k), -load(2, k)};
+    const Moments<V> source{load(3, k), {load(4, k), load(5, k), load(6, k), load(7, k), load(8, k), load(9, k)}};
+    add_field_of(source, x, rsqrt(dot(x, x) + V(task.softening_squared)), l);
+  }
+  for_each_coefficient(*task.expansion, l, [](double& to, V from) BRECCIA_INLINE_LAMBDA {
+    to += static_cast<double>(horizontal_sum(from));
+  });
+}
+
+}  // namespace
+
+template <class Real>
+const InteractionKernels<Real>& kernels() {
+  static constexpr InteractionKernels<Real> kKernels{evaluate_task<Real>, expand_task<Real>};
+  return kKernels;
+}
+template const InteractionKernels<float>& kernels<float>();
+template const InteractionKernels<double>& kernels<double>();
+
+}  // namespace breccia::gravity::BRECCIA_ISA

@@ -1,0 +1,97 @@
+// Particles sorted along a Morton curve and the tree of cells over them, built level by level without pointers.
+//
+// Cells split by up to three bits of the key, fewer where that is enough to reach the group or leaf size: groups and
+// leaves then are filled to between half and all of their limit wherever the root cube happens to lie.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "gravity/solver.hpp"
+#include "gravity/tree/morton.hpp"
+#include "gravity/tree/multipole.hpp"
+#include "gravity/tree/radix_sort.hpp"
+
+namespace breccia::gravity {
+
+/// Most particles of a leaf (a source opened no further) and of a group (targets that share one interaction list).
+inline constexpr std::int64_t kLeafParticles = 16;
+inline constexpr std::int64_t kGroupParticles = 128;
+
+/// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree that every rank knows.
+inline constexpr std::int64_t kCoarseCells = 1024;
+
+/// Lengths in Root::unit, masses in the caller's unit, G = 1. Children follow each other and come after their parent.
+struct Cell {
+  Vec3d centre{};             ///< centre of mass
+  double radius = 0.0;        ///< no particle is farther from the centre
+  Moments<double> moments{};  ///< about the centre
+  std::int64_t count = 0;     ///< particles, those of all ranks
+  std::int32_t first_child = 0, children = 0;
+  std::int32_t begin = 0, end = 0;  ///< particles in this rank's arrays
+  std::int32_t key_bits = 0;        ///< leading key bits its particles share
+  bool is_target = true;            ///< holds particles whose field this rank computes
+
+  [[nodiscard]] bool is_leaf() const { return children == 0; }
+  [[nodiscard]] bool is_group() const { return count <= kGroupParticles; }
+};
+
+/// How a cell splits: its children differ in `bits` key bits after the first `start`.
+struct Split {
+  int start = 0;
+  int bits = 0;
+};
+
+/// `low` and `high`: smallest and largest key of the cell, of all ranks; bits = 0 for a leaf.
+Split split_of(std::int64_t count, int key_bits, std::uint64_t low, std::uint64_t high);
+
+/// A cell of more particles is split on all ranks together.
+std::int64_t coarse_limit(std::int64_t all_particles);
+
+/// Sorted particles, coordinates scaled (Root::scaled).
+struct SortedParticles {
+  std::vector<double> x, y, z, mass;
+  std::vector<std::uint64_t> key;
+  std::vector<std::int64_t> order;  ///< index of each in the caller's arrays
+
+  [[nodiscard]] std::int64_t size() const { return static_cast<std::int64_t>(x.size()); }
+  [[nodiscard]] Vec3d position(std::int64_t i) const {
+    const auto k = static_cast<std::size_t>(i);
+    return {x[k], y[k], z[k]};
+  }
+};
+
+class Tree {
+ public:
+  /// Sorts the particles (masses in units of `mass_unit`) by their key in the root cube.
+  void sort(const Root& root, ParticlesView particles, double mass_unit, int threads);
+
+  /// The whole tree of these particles alone.
+  void build(int threads);
+
+  /// Splits the cells `frontier`, whose particles are here, down to leaves, and sets the moments of all new cells and
+  /// of the frontier.
+  void grow(std::span<const std::int32_t> frontier, int threads);
+
+  /// Moments of an inner cell from its children, of a leaf from its particles.
+  void set_moments(Cell& cell) const;
+
+  [[nodiscard]] const Cell& cell(std::int32_t i) const { return cells[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] std::span<const Cell> children(const Cell& c) const {
+    return std::span(cells).subspan(static_cast<std::size_t>(c.first_child), static_cast<std::size_t>(c.children));
+  }
+
+  SortedParticles particles;
+  std::vector<Cell> cells;  ///< the root first; empty without particles
+  std::int64_t all_particles = 0;
+
+ private:
+  std::vector<KeyedIndex> keyed_, scratch_;
+};
+
+/// Cube around particles in [low, high] with their coordinates shifted at random against it, so that the errors of
+/// successive evaluations are not alike. The shift depends on the coordinates alone: a repeated run repeats it.
+Root random_root(Vec3d low, Vec3d high);
+
+}  // namespace breccia::gravity

@@ -1,0 +1,246 @@
+#include "gravity/tree/walk.hpp"
+
+#include <omp.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "gravity/tree/opening.hpp"
+#include "gravity/tree/workspace.hpp"
+
+namespace breccia::gravity {
+namespace {
+
+// Target cells of fewer particles than this share of all are walked as one piece of parallel work.
+constexpr std::int64_t kBranches = 128;
+
+// A cell of so few particles costs less as particles.
+constexpr std::int64_t kFewParticles = 2;
+
+// A group whose sources reach this many times the distance of its closest neighbours needs two floats per coordinate;
+// one would be off by 1e-4 of that distance.
+constexpr double kWideGroup = 2048.0;
+
+// Sources still to be placed, as positions in a list that grows and shrinks with the depth of the walk.
+struct Candidates {
+  std::size_t begin, end;
+};
+
+// One thread's lists.
+template <class Real>
+struct Walking {
+  Workspace<Real> work;
+  CellList<Real> expansions;
+  std::vector<std::int32_t> candidates;
+  std::vector<std::int32_t> stack;
+  double reach;  ///< farthest particle among the sources of this group, from its centre
+  InteractionCounts counts;
+};
+
+// A target cell with all it needs to be walked on its own.
+struct Branch {
+  std::int32_t cell;
+  std::vector<std::int32_t> candidates;
+  LocalExpansion<double> far;
+};
+
+template <class Real>
+class Walker {
+ public:
+  Walker(const Tree& targets, const std::vector<double>& scales, const Tree& sources, const WalkSettings& settings,
+         FieldSums& sums)
+      : targets_(targets), scales_(scales), sources_(sources), settings_(settings), sums_(sums) {}
+
+  InteractionCounts run() {
+    if (targets_.cells.empty() || sources_.cells.empty()) return {};
+    Walking<Real> trunk;
+    branch_limit_ = targets_.all_particles / kBranches;
+    trunk.candidates.push_back(0);
+    descend(trunk, 0, {0, 1}, {}, true);
+
+    std::vector<Walking<Real>> walking(static_cast<std::size_t>(settings_.threads));
+#pragma omp parallel for num_threads(settings_.threads) schedule(dynamic)
+    for (std::size_t b = 0; b < branches_.size(); ++b) {
+      Walking<Real>& mine = walking[static_cast<std::size_t>(omp_get_thread_num())];
+      mine.candidates = branches_[b].candidates;
+      descend(mine, branches_[b].cell, {0, mine.candidates.size()}, branches_[b].far, false);
+    }
+    InteractionCounts counts = trunk.counts;
+    for (const Walking<Real>& w : walking) counts += w.counts;
+    return counts;
+  }
+
+ private:
+  [[nodiscard]] double largest_error(std::int32_t t) const {
+    return settings_.tolerance * scales_[static_cast<std::size_t>(t)];
+  }
+  [[nodiscard]] Real softening_squared() const {
+    return static_cast<Real>(settings_.softening * settings_.softening);
+  }
+
+  // `in_trunk`: stops at cells small enough to be branches, and keeps those for later.
+  void descend(Walking<Real>& w, std::int32_t t, Candidates from, const LocalExpansion<double>& far, bool in_trunk) {
+    const Cell& cell = targets_.cell(t);
+    const bool last = cell.is_group() || cell.is_leaf();
+    if (in_trunk && (last || cell.count <= branch_limit_)) {
+      const auto list = w.candidates.begin();
+      branches_.push_back({t, {list + static_cast<std::ptrdiff_t>(from.begin), list + static_cast<std::ptrdiff_t>(from.end)}, far});
+      return;
+    }
+    if (last) return sum_group(w, t, from, far);
+    LocalExpansion<double> own = far;
+    const Candidates rest = separate(w, t, from, own);
+    for (std::int32_t c = cell.first_child; c < cell.first_child + cell.children; ++c) {
+      const Cell& child = targets_.cell(c);
+      if (child.is_target) descend(w, c, rest, shifted(own, child.centre - cell.centre), in_trunk);
+    }
+    w.candidates.resize(rest.begin);
+  }
+
+  void push_children(std::vector<std::int32_t>& stack, const Cell& source) const {
+    for (std::int32_t c = source.first_child + source.children; c-- > source.first_child;) stack.push_back(c);
+  }
+
+  // Expands the candidates that are far enough, or their parts, around cell t; returns the others.
+  Candidates separate(Walking<Real>& w, std::int32_t t, Candidates from, LocalExpansion<double>& far) const {
+    const Cell& target = targets_.cell(t);
+    const double allowed = largest_error(t);
+    const std::size_t begin = w.candidates.size();
+    w.expansions.clear();
+    for (std::size_t k = from.begin; k < from.end; ++k) {
+      w.stack.assign(1, w.candidates[k]);
+      while (!w.stack.empty()) {
+        const std::int32_t s = w.stack.back();
+        w.stack.pop_back();
+        const Cell& source = sources_.cell(s);
+        if (expandable(source, target, allowed)) {
+          w.expansions.add(source, target.centre);
+        } else if (!source.is_leaf() && source.radius >= target.radius) {
+          push_children(w.stack, source);
+        } else {
+          w.candidates.push_back(s);
+        }
+      }
+    }
+    expand_listed(w, far);
+    return {begin, w.candidates.size()};
+  }
+
+  void expand_listed(Walking<Real>& w, LocalExpansion<double>& far) const {
+    const std::int64_t count = w.expansions.arrays().count;
+    if (count == 0) return;
+    w.counts.expansions += static_cast<double>(count);
+    w.expansions.pad();
+    kernels_.expand(ExpansionTask<Real>{w.expansions.arrays(), softening_squared(), &far});
+  }
+
+  // Everything that is left acts on the group's particles directly.
+  void sum_group(Walking<Real>& w, std::int32_t t, Candidates from, LocalExpansion<double> far) const {
+    const Cell& group = targets_.cell(t);
+    const bool same = &targets_ == &sources_;
+    w.work.cells.clear();
+    w.work.ranges.clear();
+    w.expansions.clear();
+    w.reach = group.radius;
+    if (same) w.work.ranges.push_back({group.begin, group.end});
+    list_sources(w, t, from, same);
+    expand_listed(w, far);
+
+    GroupTask<Real> task{};
+    task.targets = mass_arrays(targets_.particles);
+    task.begin = group.begin;
+    task.end = group.end;
+    task.centre = group.centre;
+    task.far = &far;
+    task.sources = mass_arrays(sources_.particles);
+    task.self = same;
+    task.split_coordinates = needs_two_floats(group, w.reach);
+    task.softening_squared = softening_squared();
+    for (int axis = 0; axis < 3; ++axis) task.acceleration[axis] = sums_.acceleration[axis].data();
+    task.potential = sums_.potential.empty() ? nullptr : sums_.potential.data();
+    w.work.lend_to(task);
+    kernels_.evaluate_group(task);
+    count(w, task);
+  }
+
+  void list_sources(Walking<Real>& w, std::int32_t t, Candidates from, bool same) const {
+    const Cell& group = targets_.cell(t);
+    const double allowed = largest_error(t);
+    for (std::size_t k = from.begin; k < from.end; ++k) {
+      w.stack.assign(1, w.candidates[k]);
+      while (!w.stack.empty()) {
+        const Cell& source = sources_.cell(w.stack.back());
+        w.stack.pop_back();
+        if (same && source.begin >= group.begin && source.end <= group.end && source.end > source.begin) continue;
+        if (source.count > kFewParticles && expandable(source, group, allowed)) {
+          w.expansions.add(source, group.centre);
+        } else if (source.count > kFewParticles && visible_whole(source, group, allowed)) {
+          w.work.cells.add(source, group.centre);
+        } else if (source.is_leaf()) {
+          w.work.add_range(source.begin, source.end);
+          const Vec3d d = source.centre - group.centre;
+          w.reach = std::max(w.reach, std::sqrt(dot(d, d)) + source.radius);
+        } else {
+          push_children(w.stack, source);
+        }
+      }
+    }
+  }
+
+  // Neighbours on the curve are neighbours in space often enough to tell how close the closest particles come.
+  [[nodiscard]] bool needs_two_floats(const Cell& group, double reach) const {
+    const SortedParticles& p = targets_.particles;
+    double closest = reach * reach;
+    for (std::int64_t i = group.begin + 1; i < group.end; ++i) {
+      const Vec3d d = p.position(i) - p.position(i - 1);
+      const double d2 = dot(d, d);
+      if (d2 > 0.0) closest = std::min(closest, d2);
+    }
+    const double resolved = reach / kWideGroup;
+    return closest + settings_.softening * settings_.softening < resolved * resolved;
+  }
+
+  static void count(Walking<Real>& w, const GroupTask<Real>& task) {
+    const auto targets = static_cast<double>(task.end - task.begin);
+    std::int64_t sources = 0;
+    for (const Range r : w.work.ranges) sources += r.end - r.begin;
+    w.counts.pairs += targets * static_cast<double>(sources);
+    w.counts.cells += targets * static_cast<double>(task.cells.count);
+  }
+
+  const InteractionKernels<Real>& kernels_ = interaction_kernels<Real>();
+  const Tree& targets_;
+  const std::vector<double>& scales_;
+  const Tree& sources_;
+  WalkSettings settings_;
+  FieldSums& sums_;
+  std::int64_t branch_limit_ = 0;
+  std::vector<Branch> branches_;
+};
+
+}  // namespace
+
+void FieldSums::reset(std::int64_t particles, bool with_potential) {
+  const auto n = static_cast<std::size_t>(particles);
+  for (auto& a : acceleration) a.assign(n, 0.0);
+  potential.assign(with_potential ? n : 0, 0.0);
+}
+
+InteractionCounts& InteractionCounts::operator+=(const InteractionCounts& b) {
+  pairs += b.pairs;
+  cells += b.cells;
+  expansions += b.expansions;
+  return *this;
+}
+
+template <class Real>
+InteractionCounts walk(const Tree& targets, const std::vector<double>& scales, const Tree& sources,
+                       const WalkSettings& settings, FieldSums& sums) {
+  return Walker<Real>(targets, scales, sources, settings, sums).run();
+}
+template InteractionCounts walk<float>(const Tree&, const std::vector<double>&, const Tree&, const WalkSettings&,
+                                       FieldSums&);
+template InteractionCounts walk<double>(const Tree&, const std::vector<double>&, const Tree&, const WalkSettings&,
+                                        FieldSums&);
+
+}  // namespace breccia::gravity
