@@ -9,9 +9,8 @@
 namespace breccia::gravity {
 namespace {
 
-// TSC assignment and interpolation each smear by a cloud of variance 1/4 per axis, as much together as a Gaussian split
-// whose squared scale is larger by this: the kernel is that of the narrower split. Dividing by the window in Fourier
-// space is as accurate but rings around the kink where the periodic images of the kernel meet.
+// TSC assignment and interpolation each smear by a cloud of variance 1/4 per axis: together as exp(-k^2/4). Dividing by
+// the window in Fourier space is as accurate but rings around the kink where the periodic images of the kernel meet.
 constexpr double kTscSmearing = 0.25;
 
 // Columns in rows of x so wide that the nodes of every other row are disjoint: TSC reaches 1.5 cells to either side.
@@ -51,10 +50,8 @@ BoxMesh<Real>::BoxMesh(const MeshSize& size, const GaussianSplit& split, const m
     }
   }
   if (transformers_ == MPI_COMM_NULL) return;
-  GaussianSplit narrow = split;
-  narrow.scale = std::sqrt(split.scale * split.scale - kTscSmearing);
   const auto kernel = [&](int x, int y, int z) {
-    return long_range_potential(narrow, std::sqrt(1.0 * x * x + 1.0 * y * y + 1.0 * z * z));
+    return unsmeared_long_range_potential(split, kTscSmearing, std::sqrt(1.0 * x * x + 1.0 * y * y + 1.0 * z * z));
   };
   convolution_ = std::make_unique<Convolution<Real>>(size, kernel, mpi::Comm(transformers_), threads);
 }

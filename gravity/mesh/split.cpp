@@ -77,6 +77,29 @@ double long_range_potential(const GaussianSplit& split, double r) {
   return -minus_long_range_potential(split, std::hypot(r, split.softening));
 }
 
+// long = -2/sqrt(pi) int_0^{1/2rs} exp(-rho^2 t^2) dt, and exp(-r^2 t^2) is the smeared exp(-r^2 u^2), but for its
+// amplitude, with 1/t^2 = 1/u^2 + 4 smearing. In terms of u the integral is that of a narrower split, of
+// exp(-r^2 u^2 - eps^2 t^2); the difference of eps^2 t^2 to eps^2 u^2 is integrated here, the rest is known.
+double unsmeared_long_range_potential(const GaussianSplit& split, double smearing, double r) {
+  GaussianSplit narrow = split;
+  narrow.scale = std::sqrt(split.scale * split.scale - smearing);
+  const double end = 0.5 / narrow.scale;
+  const double eps2 = split.softening * split.softening;
+  const double rho2 = r * r + eps2;
+  const auto difference = [&](double u) {
+    const double u2 = u * u;
+    return std::exp(-rho2 * u2) * std::expm1(eps2 * u2 * (4.0 * smearing * u2) / (1.0 + 4.0 * smearing * u2));
+  };
+  // Falls off as eps^2 smearing / r^5.
+  if (eps2 == 0.0 || r > 32.0 * narrow.scale) return long_range_potential(narrow, r);
+  // Simpson's rule; the integrand is smooth over 1/r, at least two intervals.
+  constexpr int kIntervals = 64;
+  const double step = end / kIntervals;
+  double sum = difference(end);
+  for (int k = 1; k < kIntervals; ++k) sum += (k % 2 == 1 ? 4.0 : 2.0) * difference(step * k);
+  return long_range_potential(narrow, r) - 2.0 / std::sqrt(kPi) * sum * step / 3.0;
+}
+
 template <class Real>
 ShortRange<Real> fit_short_range(const GaussianSplit& split) {
   const auto force = [&](double rho) { return long_range_force(split, rho); };

@@ -20,6 +20,10 @@ struct GaussianSplit {
 /// -erf(rho / 2 rs) / rho of the pair at distance r.
 double long_range_potential(const GaussianSplit& split, double r);
 
+/// What becomes that potential when smeared by a Gaussian exp(-smearing k^2) in Fourier space: every Gaussian of the
+/// sum is made narrower by as much. Needs smearing < scale^2.
+double unsmeared_long_range_potential(const GaussianSplit& split, double smearing, double r);
+
 /// Square of the distance below which two particles without softening do not feel each other [cells^2]: coordinates
 /// relative to clusters are not exact enough to tell such pairs from coincident ones.
 template <class Real>

@@ -1,11 +1,26 @@
 #include "gravity/mesh/tree_pm.hpp"
 
 #include <algorithm>
+#include <string>
 
-#include "breccia/constants.hpp"
+#include "breccia/error.hpp"
 #include "gravity/evaluation.hpp"
 
 namespace breccia::gravity {
+namespace {
+
+// A narrower split is beyond what TSC on the mesh resolves.
+constexpr double kLeastSplit = 0.6;
+
+void check(const MeshParameters& mesh) {
+  if (!(mesh.split >= kLeastSplit)) {
+    throw UsageError("gravity.split = " + std::to_string(mesh.split) + ": must be at least 0.6 mesh cells");
+  }
+  if (!(mesh.cell >= 0.0)) throw UsageError("gravity.mesh = " + std::to_string(mesh.cell) + " m: must not be negative");
+  fit_short_range<double>({mesh.split, mesh.split * mesh.cutoff, 0.0});
+}
+
+}  // namespace
 
 template <class Real>
 TreePm<Real>::TreePm(const Parameters& parameters, const mpi::Comm& comm, int threads)
@@ -14,6 +29,7 @@ TreePm<Real>::TreePm(const Parameters& parameters, const mpi::Comm& comm, int th
       threads_(std::max(threads, 1)),
       spacing_(parameters.mesh.particle_spacing),
       unsplit_(parameters, comm, threads_) {
+  check(parameters.mesh);
   for (std::size_t k = 0; k < kMostBoxes; ++k) fields_.emplace_back(comm, threads_);
 }
 
