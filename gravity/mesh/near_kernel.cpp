@@ -151,7 +151,7 @@ struct PairLoop {
         const int most = (axis == 0 ? columns.nx : columns.ny) - 1;
         const double low = (at - reach) / columns.width;
         const double high = (at + reach) / columns.width;
-        from[axis] = low <= 0.0 ? 0 : (low > most ? most + 1 : static_cast<int>(low));
+        from[axis] = low <= 0.0 ? 0 : (low >= most + 1 ? most + 1 : static_cast<int>(low));
         to[axis] = high < 0.0 ? -1 : (high >= most ? most : static_cast<int>(high));
       }
       for (int x = from[0]; x <= to[0]; ++x) {

@@ -98,8 +98,9 @@ void UnsplitField::grow_trees(double mass_unit, bool with_potential) {
   for (Set& s : sets_) {
     s.tree.sort(root_, {s.position, s.mass}, mass_unit, threads_);
     s.tree.build(threads_);
-    mark_targets(s.tree, s.owned);
+    // Before the targets are marked: the scales of a cell must not depend on which of its particles are here.
     s.scales = acceleration_scales(s.tree, parameters_.softening / root_.unit, threads_);
+    mark_targets(s.tree, s.owned);
     s.sums.reset(s.tree.particles.size(), with_potential);
   }
   for (Set& s : sets_) {

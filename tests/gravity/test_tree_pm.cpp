@@ -251,7 +251,9 @@ TEST(TreePm, AnyDistributionGivesTheSameField) {
   const int last = mpi::Comm().size() - 1;
   for (const Cloud& cloud : {two_bodies(3000), body_and_debris(3000, 300)}) {
     const Field alone = evaluate(cloud, parameters(3000), all_on(last));
+    int distribution = 0;
     for (const Owner& owner : {round_robin(), slabs(cloud, 3e5), slabs(cloud, 1e4)}) {
+      SCOPED_TRACE("distribution " + std::to_string(distribution++) + " of " + std::to_string(cloud.position.size()));
       const Field field = evaluate(cloud, parameters(3000), owner);
       EXPECT_LT(rms_error(field.acceleration, alone.acceleration), 2e-5);
       EXPECT_LT(largest_relative_error(field.potential, alone.potential), 2e-5);
