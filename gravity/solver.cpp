@@ -4,11 +4,26 @@
 #include <string>
 
 #include "breccia/error.hpp"
+#include "gravity/auto_solver.hpp"
 #include "gravity/direct_sum.hpp"
 #include "gravity/mesh/tree_pm.hpp"
 #include "gravity/tree/tree_solver.hpp"
 
 namespace breccia::gravity {
+namespace {
+
+// Below this the direct sum is faster on one core (measured; gravity.md 3), and exact.
+constexpr std::uint64_t kDirectParticles = 2000;
+
+// Below this error the tree's float fields no longer follow the opening.
+constexpr double kSmallestTreeError = 1e-6;
+
+}  // namespace
+
+GravityMethod cheapest_method(std::uint64_t all_particles, double error) {
+  const bool direct = all_particles <= kDirectParticles || error < kSmallestTreeError;
+  return direct ? GravityMethod::kDirect : GravityMethod::kTree;
+}
 
 std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& parameters, const mpi::Comm& comm,
                                     int threads) {
@@ -16,12 +31,16 @@ std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& para
     throw UsageError("gravity.softening = " + std::to_string(parameters.softening) +
                      " m: must be zero or a positive finite length");
   }
+  if (!(parameters.error > 0.0) || !(parameters.opening >= 0.0)) {
+    throw UsageError("gravity.error and gravity.opening must be positive");
+  }
   switch (method) {
-    case GravityMethod::kDirect:
     case GravityMethod::kAuto:
+      return std::make_unique<AutoSolver>(parameters, comm, threads);
+    case GravityMethod::kDirect:
       return std::make_unique<DirectSum>(parameters, comm, threads);
     case GravityMethod::kOff:
-      throw UsageError("effects.gravity = off: there is nothing to evaluate; use direct");
+      throw UsageError("effects.gravity = off: there is nothing to evaluate; use tree or direct");
     case GravityMethod::kTree:
       return std::make_unique<TreeSolver>(parameters, comm, threads);
     case GravityMethod::kTreePm:
@@ -30,7 +49,7 @@ std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& para
       }
       return std::make_unique<TreePm<float>>(parameters, comm, threads);
   }
-  throw UsageError("effects.gravity: unknown method; use direct");
+  throw UsageError("effects.gravity: unknown method; use auto");
 }
 
 }  // namespace breccia::gravity

@@ -21,8 +21,8 @@ struct ParticlesView {
 struct MeshParameters {
   double particle_spacing = 0.0;  ///< mean distance of the particles where they are dense [m]; 0: found from them
   double cell = 0.0;              ///< [m]; 0: kCellsPerSpacing particle spacings
-  double split = 0.8;             ///< scale rs of the Gaussian split [cells]
-  double cutoff = 4.5;            ///< of the short-range part [rs]
+  double split = 0.0;             ///< scale rs of the Gaussian split [cells]; 0: follows from Parameters::error
+  double cutoff = 0.0;            ///< of the short-range part [rs]; 0: follows from the split
 };
 
 /// Not near 1: a lattice of particles beats with a mesh of its own spacing. Larger cells also balance the cost of
@@ -33,7 +33,8 @@ struct Parameters {
   double softening = 0.0;  ///< Plummer length: a pair at distance r counts with 1/sqrt(r^2 + softening^2) [m]
   Precision precision = Precision::kMixed;
   MeshParameters mesh{};
-  double opening = 1e-3;  ///< tree: error allowed to one cell, as a fraction of the acceleration
+  double error = 3.5e-4;  ///< rms of |da|/|a| that is good enough
+  double opening = 0.0;   ///< tree: error allowed to one cell, as a fraction of the acceleration; 0: follows from error
 };
 
 /// What one evaluation cost and how well it conserved momentum. Seconds, pairs and bytes are this rank's.
@@ -65,8 +66,12 @@ class Solver {
   [[nodiscard]] virtual const Stats& last() const = 0;
 };
 
-/// The solver for `method`; kAuto takes the direct sum. Throws UsageError for kOff, for methods
-/// this program lacks and for a softening that is negative or not finite.
+/// The method kAuto stands for: the direct sum up to some thousand particles or where the error asked for is below what
+/// the tree can do, else the tree.
+GravityMethod cheapest_method(std::uint64_t all_particles, double error);
+
+/// The solver for `method`; kAuto chooses anew at each evaluation. Throws UsageError for kOff, for methods this program
+/// lacks, for a softening that is negative or not finite and for an error or opening that is not positive.
 std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& parameters, const mpi::Comm& comm,
                                     int threads);
 

@@ -8,8 +8,8 @@
 
 namespace breccia::gravity {
 
-/// Errors |da|/|a| of some particles. In `max`, |a| counts at least a tenth of its mean: the relative error of a particle
-/// that feels next to nothing says nothing.
+/// Errors |da|/|a| of some particles. In `max`, |a| counts at least a tenth of its mean: the relative error of a
+/// particle that feels next to nothing says nothing.
 struct FieldErrors {
   std::int64_t targets = 0;
   double rms = 0.0, median = 0.0, p99 = 0.0, max = 0.0;

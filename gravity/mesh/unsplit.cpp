@@ -5,6 +5,7 @@
 
 #include "breccia/constants.hpp"
 #include "gravity/tree/scales.hpp"
+#include "gravity/tree/tree_solver.hpp"
 
 namespace breccia::gravity {
 namespace {
@@ -95,11 +96,12 @@ void UnsplitField::gather(ParticlesView particles, std::span<const std::uint8_t>
 }
 
 void UnsplitField::grow_trees(double mass_unit, bool with_potential) {
+  const mpi::Comm self(MPI_COMM_SELF);
   for (Set& s : sets_) {
     s.tree.sort(root_, {s.position, s.mass}, mass_unit, threads_);
     s.tree.build(threads_);
     // Before the targets are marked: the scales of a cell must not depend on which of its particles are here.
-    s.scales = acceleration_scales(s.tree, parameters_.softening / root_.unit, threads_);
+    s.scales = acceleration_scales(s.tree, parameters_.softening / root_.unit, threads_, self);
     mark_targets(s.tree, s.owned);
     s.sums.reset(s.tree.particles.size(), with_potential);
   }
@@ -112,7 +114,7 @@ void UnsplitField::grow_trees(double mass_unit, bool with_potential) {
 
 void UnsplitField::walk_all(std::size_t target, Stats& stats) {
   Set& s = sets_[target];
-  const WalkSettings settings{parameters_.opening, parameters_.softening / root_.unit, threads_};
+  const WalkSettings settings{opening_for(parameters_), parameters_.softening / root_.unit, threads_};
   for (std::size_t source = 0; source < sets_.size(); ++source) {
     if (source == target && target > 0) continue;
     const Tree& from = sets_[source].tree;

@@ -43,8 +43,8 @@ void copy_relative(const MassArrays& from, std::int64_t begin, std::int64_t end,
 
 template <class Real>
 Relative<Real> relative(const Real* first, std::int64_t stride, const Real* mass) {
-  return {{first, first + stride, first + 2 * stride}, {first + 3 * stride, first + 4 * stride, first + 5 * stride},
-          mass};
+  return {
+      {first, first + stride, first + 2 * stride}, {first + 3 * stride, first + 4 * stride, first + 5 * stride}, mass};
 }
 
 template <class V, bool kPotential>
@@ -61,25 +61,36 @@ void add_far(const LocalExpansion<double>& far, const Relative<typename V::Scala
   }
 }
 
-template <class V>
-BRECCIA_HD Moments<V> moments_of(const CellArrays<typename V::Scalar>& cells, std::int64_t k) {
-  const auto c = [&](int i) BRECCIA_INLINE_LAMBDA { return V(cells.component[i][k]); };
-  return {c(3), {c(4), c(5), c(6), c(7), c(8), c(9)}};
+// Distant cells at a time: their converted data stays in the first-level cache.
+constexpr std::int64_t kCellBlock = 64;
+
+// A cell as seen from an origin: position, mass, second moment.
+constexpr int kComponents = 10;
+template <class Real>
+BRECCIA_HD void convert(const Cell& cell, Vec3d origin, Real* to, int stride) {
+  const Vec3d x = cell.centre - origin;
+  const Sym3<double>& s = cell.moments.second;
+  const double values[kComponents] = {x.x, x.y, x.z, cell.moments.mass, s.xx, s.yy, s.zz, s.xy, s.xz, s.yz};
+  for (int c = 0; c < kComponents; ++c) to[c * stride] = static_cast<Real>(values[c]);
 }
 
 template <class V, bool kPotential>
-void add_cells(const CellArrays<typename V::Scalar>& cells, const Relative<typename V::Scalar>& targets,
-               std::int64_t padded, V softening_squared, const Sums& sums) {
-  for (std::int64_t begin = 0; begin < cells.count; begin += kSourceBlock) {
-    const std::int64_t end = begin + kSourceBlock < cells.count ? begin + kSourceBlock : cells.count;
+void add_cells(const CellRefs& cells, Vec3d centre, const Relative<typename V::Scalar>& targets, std::int64_t padded,
+               V softening_squared, const Sums& sums) {
+  using Real = typename V::Scalar;
+  Real block[kCellBlock][kComponents];
+  for (std::int64_t begin = 0; begin < cells.count; begin += kCellBlock) {
+    const std::int64_t count = begin + kCellBlock < cells.count ? kCellBlock : cells.count - begin;
+    for (std::int64_t k = 0; k < count; ++k) convert(cells.all[cells.list[begin + k]], centre, block[k], 1);
     for (std::int64_t i = 0; i < padded; i += V::kLanes) {
       const Vec3<V> r{V::load(targets.high[0] + i), V::load(targets.high[1] + i), V::load(targets.high[2] + i)};
       Vec3<V> acceleration{};
       V potential{};
-      for (std::int64_t k = begin; k < end; ++k) {
-        const Vec3<V> x{r.x - V(cells.component[0][k]), r.y - V(cells.component[1][k]), r.z - V(cells.component[2][k])};
-        const V q = rsqrt(dot(x, x) + softening_squared);
-        const PointField<V> field = field_of(moments_of<V>(cells, k), x, q);
+      for (std::int64_t k = 0; k < count; ++k) {
+        const Real* c = block[k];
+        const Vec3<V> x{r.x - V(c[0]), r.y - V(c[1]), r.z - V(c[2])};
+        const Moments<V> source{V(c[3]), {V(c[4]), V(c[5]), V(c[6]), V(c[7]), V(c[8]), V(c[9])}};
+        const PointField<V> field = field_of(source, x, rsqrt(dot(x, x) + softening_squared));
         acceleration += field.gradient;
         if constexpr (kPotential) potential -= field.value;
       }
@@ -142,7 +153,7 @@ void evaluate_as(const GroupTask<typename V::Scalar>& task) {
   Real* memory = task.reals + 6 * padded;
 
   if (task.far != nullptr) add_far<V, kPotential>(*task.far, targets, padded, sums);
-  add_cells<V, kPotential>(task.cells, targets, padded, V(task.softening_squared), sums);
+  add_cells<V, kPotential>(task.cells, task.centre, targets, padded, V(task.softening_squared), sums);
   const bool guarded = task.softening_squared <= kCoincidentSquared<Real>;
   if (low) {
     if constexpr (std::is_same_v<Real, float>) {
@@ -170,12 +181,19 @@ void evaluate_task(const GroupTask<Real>& task) {
 template <class Real>
 void expand_task(const ExpansionTask<Real>& task) {
   using V = RegisterPack<Real>;
-  const auto load = [&](int c, std::int64_t k)
-                        BRECCIA_INLINE_LAMBDA { return V::load(task.cells.component[c] + k); };
   LocalExpansion<V> l{};
   for (std::int64_t k = 0; k < task.cells.count; k += V::kLanes) {
-    const Vec3<V> x{-load(0, k), -load(1, k), -load(2, k)};
-    const Moments<V> source{load(3, k), {load(4, k), load(5, k), load(6, k), load(7, k), load(8, k), load(9, k)}};
+    // Lanes without a cell hold no mass, a unit away.
+    Real block[kComponents][V::kLanes] = {};
+    for (int lane = 0; lane < V::kLanes; ++lane) {
+      block[0][lane] = Real(1);
+      if (k + lane < task.cells.count) {
+        convert(task.cells.all[task.cells.list[k + lane]], task.centre, &block[0][lane], V::kLanes);
+      }
+    }
+    const auto load = [&](int c) BRECCIA_INLINE_LAMBDA { return V::load(block[c]); };
+    const Vec3<V> x{-load(0), -load(1), -load(2)};
+    const Moments<V> source{load(3), {load(4), load(5), load(6), load(7), load(8), load(9)}};
     add_field_of(source, x, rsqrt(dot(x, x) + V(task.softening_squared)), l);
   }
   for_each_coefficient(*task.expansion, l, [](double& to, V from) BRECCIA_INLINE_LAMBDA {

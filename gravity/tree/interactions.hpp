@@ -5,20 +5,18 @@
 #include <cstdint>
 
 #include "breccia/linalg.hpp"
-#include "gravity/tree/multipole.hpp"
+#include "gravity/tree/cell.hpp"
 
 namespace breccia::gravity {
 
-/// Registers of any instruction set and type divide this: arrays of targets and of expansion sources are padded to it.
+/// Registers of any instruction set and type divide this; arrays of targets are padded to it.
 inline constexpr std::int64_t kLanePadding = 16;
 BRECCIA_HD std::int64_t lane_padded(std::int64_t n) { return (n + kLanePadding - 1) / kLanePadding * kLanePadding; }
 
-/// Distant cells, one array per component: position relative to the target's centre, mass, second moment (xx, yy, zz,
-/// xy, xz, yz).
-inline constexpr int kCellComponents = 10;
-template <class Real>
-struct CellArrays {
-  const Real* component[kCellComponents];
+/// Distant cells: those of `all` that `list` names.
+struct CellRefs {
+  const Cell* all;
+  const std::int32_t* list;
   std::int64_t count;
 };
 
@@ -37,14 +35,14 @@ template <class Real>
 struct GroupTask {
   MassArrays targets;
   std::int64_t begin, end;
-  Vec3d centre;                         ///< origin of the relative coordinates, and of `far`
-  const LocalExpansion<double>* far;    ///< null: none
-  CellArrays<Real> cells;               ///< seen with monopole and quadrupole
-  MassArrays sources;                   ///< summed particle by particle ...
-  const Range* ranges;                  ///< ... in these ranges
+  Vec3d centre;                       ///< origin of the relative coordinates, and of `far`
+  const LocalExpansion<double>* far;  ///< null: none
+  CellRefs cells;                     ///< seen with monopole and quadrupole
+  MassArrays sources;                 ///< summed particle by particle ...
+  const Range* ranges;                ///< ... in these ranges
   std::int64_t range_count;
-  bool self;                 ///< the first range is the targets themselves
-  bool split_coordinates;    ///< closest particles are close enough to need two floats per coordinate
+  bool self;               ///< the first range is the targets themselves
+  bool split_coordinates;  ///< closest particles are close enough to need two floats per coordinate
   Real softening_squared;
   double* acceleration[3];
   double* potential;  ///< null: not wanted
@@ -58,13 +56,13 @@ BRECCIA_HD std::int64_t reals_needed(std::int64_t targets, std::int64_t sources)
 }
 BRECCIA_HD std::int64_t doubles_needed(std::int64_t targets) { return 4 * lane_padded(targets); }
 
-/// Sources of one expansion, their positions seen from its centre; padded to kLanePadding with massless ones away from
-/// the centre.
+/// Adds the fields of cells to the expansion around `centre`.
 template <class Real>
 struct ExpansionTask {
-  CellArrays<Real> cells;
+  CellRefs cells;
+  Vec3d centre;
   Real softening_squared;
-  LocalExpansion<double>* expansion;  ///< added to
+  LocalExpansion<double>* expansion;
 };
 
 /// The inner loops as compiled for one instruction set.

@@ -31,8 +31,8 @@ struct NewtonPair {
   V softening_squared;
   V coincident_squared;
 
-  BRECCIA_HD PairWeight<V> operator()(V d2) const {
-    const V r2 = d2 + softening_squared;
+  /// r2 = d^2 + softening_squared.
+  BRECCIA_HD PairWeight<V> operator()(V r2) const {
     V q = rsqrt(r2);
     if constexpr (kGuarded) q = select(r2 <= coincident_squared, V{}, q);
     return {q * (q * q), q};
@@ -90,7 +90,7 @@ BRECCIA_HD PairSums<V> sum_pairs_of(const Relative<typename V::Scalar>& targets,
     const V dx = separation<V, kLow>(sources, 0, j, high[0], low[0]);
     const V dy = separation<V, kLow>(sources, 1, j, high[1], low[1]);
     const V dz = separation<V, kLow>(sources, 2, j, high[2], low[2]);
-    PairWeight<V> weight = pair(dx * dx + (dy * dy + dz * dz));
+    PairWeight<V> weight = pair(dx * dx + (dy * dy + (dz * dz + pair.softening_squared)));
     if constexpr (kSelf) {
       const auto self = lane_is<V>(j - i);
       weight = {select(self, V{}, weight.force), select(self, V{}, weight.depth)};
@@ -108,7 +108,8 @@ BRECCIA_HD PairSums<V> sum_pairs_of(const Relative<typename V::Scalar>& targets,
 /// Adds a register of Real to doubles.
 template <class V>
 BRECCIA_HD void add_to(double* sums, V partial) {
-  for (int l = 0; l < V::kLanes; ++l) sums[l] += static_cast<double>(partial[l]);
+  using Doubles = Pack<double, V::kLanes>;
+  (Doubles::load(sums) + convert<double>(partial)).store(sums);
 }
 
 }  // namespace breccia::gravity::BRECCIA_ISA

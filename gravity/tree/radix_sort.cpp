@@ -37,13 +37,13 @@ void radix_sort(std::vector<KeyedIndex>& items, std::vector<KeyedIndex>& scratch
   const std::size_t chunks = std::clamp<std::size_t>(n / kItemsWorthAThread, 1, static_cast<std::size_t>(threads));
   std::vector<Histogram> offsets(chunks);
   for (int shift = 0; shift < 64; shift += kDigitBits) {
-#pragma omp parallel for num_threads(static_cast<int>(chunks)) schedule(static)
+#pragma omp parallel for num_threads(static_cast <int>(chunks)) schedule(static)
     for (std::size_t c = 0; c < chunks; ++c) {
       offsets[c].fill(0);
       for (std::size_t i = n * c / chunks; i < n * (c + 1) / chunks; ++i) ++offsets[c][digit(items[i].key, shift)];
     }
     if (!counts_to_offsets(offsets, n)) continue;
-#pragma omp parallel for num_threads(static_cast<int>(chunks)) schedule(static)
+#pragma omp parallel for num_threads(static_cast <int>(chunks)) schedule(static)
     for (std::size_t c = 0; c < chunks; ++c) {
       for (std::size_t i = n * c / chunks; i < n * (c + 1) / chunks; ++i) {
         scratch[offsets[c][digit(items[i].key, shift)]++] = items[i];

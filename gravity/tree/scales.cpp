@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
+#include <span>
 
 #include "gravity/tree/workspace.hpp"
 
@@ -33,18 +35,19 @@ void list_coarse_cells(const Tree& tree, const Cell& group, Sampling& s) {
   s.work.cells.clear();
   s.stack.assign(1, 0);
   while (!s.stack.empty()) {
-    const Cell& cell = tree.cell(s.stack.back());
+    const std::int32_t c = s.stack.back();
     s.stack.pop_back();
+    const Cell& cell = tree.cell(c);
     const bool own = contains(cell, group);
     if (cell.count > coarse && !cell.is_leaf()) {
       const Vec3d d = group.centre - cell.centre;
-      const double size = cell.radius + group.radius;
+      const double size = cell.radius + 0.5 * group.radius;
       if (own || size * size >= kScaleOpening * kScaleOpening * dot(d, d)) {
-        for (int c = 0; c < cell.children; ++c) s.stack.push_back(cell.first_child + c);
+        for (int k = 0; k < cell.children; ++k) s.stack.push_back(cell.first_child + k);
         continue;
       }
     }
-    if (!own) s.work.cells.add(cell, group.centre);
+    if (!own) s.work.cells.push_back(c);
   }
 }
 
@@ -65,48 +68,42 @@ double scale_of(const Tree& tree, const Cell& group, double softening, Sampling&
   task.softening_squared = static_cast<float>(softening * softening);
   for (int axis = 0; axis < 3; ++axis) task.acceleration[axis] = s.sums[axis];
   for (auto& component : s.sums) std::fill(std::begin(component), std::end(component), 0.0);
-  s.work.lend_to(task);
+  s.work.lend_to(task, tree);
   interaction_kernels<float>().evaluate_group(task);
 
   double least = std::numeric_limits<double>::max();
   for (int k = 0; k < kSamples; ++k) {
     least = std::min(least, std::hypot(s.sums[0][k], s.sums[1][k], s.sums[2][k]));
   }
-  const double own = group.radius > 0.0 ? group.moments.mass / (group.radius * group.radius) : 0.0;
-  return std::hypot(least, own);
+  return least;
 }
 
 }  // namespace
 
-std::vector<double> acceleration_scales(const Tree& tree, double softening, int threads) {
-  std::vector<double> scales(tree.cells.size(), 0.0);
-  std::vector<std::int32_t> groups, inner;
-  if (!tree.cells.empty()) inner.push_back(0);
-  for (std::size_t k = 0; k < inner.size(); ++k) {
-    const Cell& cell = tree.cell(inner[k]);
-    if (cell.is_group() || cell.is_leaf()) {
-      groups.push_back(inner[k]);
-      continue;
-    }
-    for (std::int32_t c = cell.first_child; c < cell.first_child + cell.children; ++c) {
-      if (tree.cell(c).is_target) inner.push_back(c);
-    }
-  }
+std::vector<double> acceleration_scales(const Tree& tree, double softening, int threads, const mpi::Comm& comm) {
+  const std::vector<std::int32_t> groups = tree.groups();
+  std::vector<std::int32_t> targets;
+  std::copy_if(groups.begin(), groups.end(), std::back_inserter(targets),
+               [&](std::int32_t g) { return tree.cell(g).is_target; });
+  std::vector<double> of_groups(targets.size());
   std::vector<Sampling> sampling(static_cast<std::size_t>(threads));
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
-  for (std::size_t g = 0; g < groups.size(); ++g) {
-    scales[static_cast<std::size_t>(groups[g])] =
-        scale_of(tree, tree.cell(groups[g]), softening, sampling[static_cast<std::size_t>(omp_get_thread_num())]);
+  for (std::size_t g = 0; g < targets.size(); ++g) {
+    of_groups[g] =
+        scale_of(tree, tree.cell(targets[g]), softening, sampling[static_cast<std::size_t>(omp_get_thread_num())]);
   }
-  // Children stand behind their parents in `inner`.
-  for (auto i = inner.rbegin(); i != inner.rend(); ++i) {
-    const Cell& cell = tree.cell(*i);
-    if (cell.is_group() || cell.is_leaf()) continue;
+  if (comm.size() > 1) of_groups = comm.allgather_arrays(std::span<const double>(of_groups));
+
+  std::vector<double> scales(tree.cells.size(), 0.0);
+  for (std::size_t g = 0; g < groups.size(); ++g) scales[static_cast<std::size_t>(groups[g])] = of_groups[g];
+  for (std::size_t i = tree.cells.size(); i-- > 0;) {
+    const Cell& cell = tree.cells[i];
+    if (cell.is_group()) continue;
     double least = std::numeric_limits<double>::max();
     for (std::int32_t c = cell.first_child; c < cell.first_child + cell.children; ++c) {
-      if (tree.cell(c).is_target) least = std::min(least, scales[static_cast<std::size_t>(c)]);
+      least = std::min(least, scales[static_cast<std::size_t>(c)]);
     }
-    scales[static_cast<std::size_t>(*i)] = least;
+    scales[i] = least;
   }
   return scales;
 }

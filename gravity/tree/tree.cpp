@@ -13,8 +13,8 @@ namespace {
 constexpr int kMostChildren = 8;
 constexpr std::uint32_t kRootStream = 0x67726176;
 
-// The radius of larger cells follows from their children.
-constexpr std::int64_t kExactRadius = 256;
+// The radius of larger cells follows from their children, which is up to twice too large.
+constexpr std::int64_t kExactRadius = 4096;
 
 std::uint64_t prefix(std::uint64_t key, int bits) { return bits == 0 ? 0 : key >> (kKeyBits - bits); }
 
@@ -132,16 +132,15 @@ void Tree::grow(std::span<const std::int32_t> frontier, int threads) {
   const auto split = [&](const Cell& c) {
     Children result;
     const auto& key = particles.key;
-    const Split s = split_of(c.count, c.key_bits, key[static_cast<std::size_t>(c.begin)],
-                             key[static_cast<std::size_t>(c.end) - 1]);
+    const Split s =
+        split_of(c.count, c.key_bits, key[static_cast<std::size_t>(c.begin)], key[static_cast<std::size_t>(c.end) - 1]);
     result.key_bits = s.start + s.bits;
     if (s.bits == 0) return result;
     result.bound[0] = c.begin;
     for (std::int32_t at = c.begin; at < c.end;) {
       const std::uint64_t here = prefix(key[static_cast<std::size_t>(at)], result.key_bits);
-      const auto next =
-          std::partition_point(key.begin() + at, key.begin() + c.end,
-                               [&](std::uint64_t k) { return prefix(k, result.key_bits) == here; });
+      const auto next = std::partition_point(key.begin() + at, key.begin() + c.end,
+                                             [&](std::uint64_t k) { return prefix(k, result.key_bits) == here; });
       at = static_cast<std::int32_t>(next - key.begin());
       result.bound[static_cast<std::size_t>(++result.count)] = at;
     }
@@ -178,6 +177,22 @@ void Tree::grow(std::span<const std::int32_t> frontier, int threads) {
   }
 }
 
+std::vector<std::int32_t> Tree::groups() const {
+  std::vector<std::int32_t> found, stack;
+  if (!cells.empty()) stack.push_back(0);
+  while (!stack.empty()) {
+    const std::int32_t i = stack.back();
+    const Cell& c = cell(i);
+    stack.pop_back();
+    if (c.is_group()) {
+      found.push_back(i);
+    } else {
+      for (std::int32_t k = c.children; k-- > 0;) stack.push_back(c.first_child + k);
+    }
+  }
+  return found;
+}
+
 void Tree::set_moments(Cell& c) const {
   if (c.is_leaf()) return set_leaf_moments(particles, c);
   Vec3d weighted{};
@@ -196,8 +211,7 @@ void Tree::set_moments(Cell& c) const {
     c.moments.second = c.moments.second + child.moments.second + child.moments.mass * square(d);
     radius = std::max(radius, norm(d) + child.radius);
   }
-  const bool all_here = c.count <= std::min(kExactRadius, coarse_limit(all_particles));
-  c.radius = all_here ? exact_radius(particles, c) : radius;
+  c.radius = c.count <= kExactRadius ? exact_radius(particles, c) : radius;
 }
 
 }  // namespace breccia::gravity

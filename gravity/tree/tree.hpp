@@ -9,33 +9,14 @@
 #include <vector>
 
 #include "gravity/solver.hpp"
+#include "gravity/tree/cell.hpp"
 #include "gravity/tree/morton.hpp"
-#include "gravity/tree/multipole.hpp"
 #include "gravity/tree/radix_sort.hpp"
 
 namespace breccia::gravity {
 
-/// Most particles of a leaf (a source opened no further) and of a group (targets that share one interaction list).
-inline constexpr std::int64_t kLeafParticles = 16;
-inline constexpr std::int64_t kGroupParticles = 128;
-
 /// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree that every rank knows.
 inline constexpr std::int64_t kCoarseCells = 1024;
-
-/// Lengths in Root::unit, masses in the caller's unit, G = 1. Children follow each other and come after their parent.
-struct Cell {
-  Vec3d centre{};             ///< centre of mass
-  double radius = 0.0;        ///< no particle is farther from the centre
-  Moments<double> moments{};  ///< about the centre
-  std::int64_t count = 0;     ///< particles, those of all ranks
-  std::int32_t first_child = 0, children = 0;
-  std::int32_t begin = 0, end = 0;  ///< particles in this rank's arrays
-  std::int32_t key_bits = 0;        ///< leading key bits its particles share
-  bool is_target = true;            ///< holds particles whose field this rank computes
-
-  [[nodiscard]] bool is_leaf() const { return children == 0; }
-  [[nodiscard]] bool is_group() const { return count <= kGroupParticles; }
-};
 
 /// How a cell splits: its children differ in `bits` key bits after the first `start`.
 struct Split {
@@ -76,6 +57,10 @@ class Tree {
 
   /// Moments of an inner cell from its children, of a leaf from its particles.
   void set_moments(Cell& cell) const;
+
+  /// Cells whose particles share their interactions, in the order of their particles: the largest that are no
+  /// more than kGroupParticles or cannot be split.
+  [[nodiscard]] std::vector<std::int32_t> groups() const;
 
   [[nodiscard]] const Cell& cell(std::int32_t i) const { return cells[static_cast<std::size_t>(i)]; }
   [[nodiscard]] std::span<const Cell> children(const Cell& c) const {

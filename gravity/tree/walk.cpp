@@ -30,7 +30,7 @@ struct Candidates {
 template <class Real>
 struct Walking {
   Workspace<Real> work;
-  CellList<Real> expansions;
+  std::vector<std::int32_t> expansions;
   std::vector<std::int32_t> candidates;
   std::vector<std::int32_t> stack;
   double reach;  ///< farthest particle among the sources of this group, from its centre
@@ -74,20 +74,18 @@ class Walker {
   [[nodiscard]] double largest_error(std::int32_t t) const {
     return settings_.tolerance * scales_[static_cast<std::size_t>(t)];
   }
-  [[nodiscard]] Real softening_squared() const {
-    return static_cast<Real>(settings_.softening * settings_.softening);
-  }
+  [[nodiscard]] Real softening_squared() const { return static_cast<Real>(settings_.softening * settings_.softening); }
 
   // `in_trunk`: stops at cells small enough to be branches, and keeps those for later.
   void descend(Walking<Real>& w, std::int32_t t, Candidates from, const LocalExpansion<double>& far, bool in_trunk) {
     const Cell& cell = targets_.cell(t);
-    const bool last = cell.is_group() || cell.is_leaf();
-    if (in_trunk && (last || cell.count <= branch_limit_)) {
+    if (in_trunk && (cell.is_group() || cell.count <= branch_limit_)) {
       const auto list = w.candidates.begin();
-      branches_.push_back({t, {list + static_cast<std::ptrdiff_t>(from.begin), list + static_cast<std::ptrdiff_t>(from.end)}, far});
+      branches_.push_back(
+          {t, {list + static_cast<std::ptrdiff_t>(from.begin), list + static_cast<std::ptrdiff_t>(from.end)}, far});
       return;
     }
-    if (last) return sum_group(w, t, from, far);
+    if (cell.is_group()) return sum_group(w, t, from, far);
     LocalExpansion<double> own = far;
     const Candidates rest = separate(w, t, from, own);
     for (std::int32_t c = cell.first_child; c < cell.first_child + cell.children; ++c) {
@@ -114,7 +112,7 @@ class Walker {
         w.stack.pop_back();
         const Cell& source = sources_.cell(s);
         if (expandable(source, target, allowed)) {
-          w.expansions.add(source, target.centre);
+          w.expansions.push_back(s);
         } else if (!source.is_leaf() && source.radius >= target.radius) {
           push_children(w.stack, source);
         } else {
@@ -122,16 +120,14 @@ class Walker {
         }
       }
     }
-    expand_listed(w, far);
+    expand_listed(w, target, far);
     return {begin, w.candidates.size()};
   }
 
-  void expand_listed(Walking<Real>& w, LocalExpansion<double>& far) const {
-    const std::int64_t count = w.expansions.arrays().count;
-    if (count == 0) return;
-    w.counts.expansions += static_cast<double>(count);
-    w.expansions.pad();
-    kernels_.expand(ExpansionTask<Real>{w.expansions.arrays(), softening_squared(), &far});
+  void expand_listed(Walking<Real>& w, const Cell& target, LocalExpansion<double>& far) const {
+    w.counts.expansions += static_cast<double>(w.expansions.size());
+    if (w.expansions.empty()) return;
+    kernels_.expand({refs(w.expansions, sources_), target.centre, softening_squared(), &far});
   }
 
   // Everything that is left acts on the group's particles directly.
@@ -144,7 +140,7 @@ class Walker {
     w.reach = group.radius;
     if (same) w.work.ranges.push_back({group.begin, group.end});
     list_sources(w, t, from, same);
-    expand_listed(w, far);
+    expand_listed(w, group, far);
 
     GroupTask<Real> task{};
     task.targets = mass_arrays(targets_.particles);
@@ -158,7 +154,7 @@ class Walker {
     task.softening_squared = softening_squared();
     for (int axis = 0; axis < 3; ++axis) task.acceleration[axis] = sums_.acceleration[axis].data();
     task.potential = sums_.potential.empty() ? nullptr : sums_.potential.data();
-    w.work.lend_to(task);
+    w.work.lend_to(task, sources_);
     kernels_.evaluate_group(task);
     count(w, task);
   }
@@ -169,13 +165,15 @@ class Walker {
     for (std::size_t k = from.begin; k < from.end; ++k) {
       w.stack.assign(1, w.candidates[k]);
       while (!w.stack.empty()) {
-        const Cell& source = sources_.cell(w.stack.back());
+        const std::int32_t s = w.stack.back();
         w.stack.pop_back();
+        const Cell& source = sources_.cell(s);
         if (same && source.begin >= group.begin && source.end <= group.end && source.end > source.begin) continue;
-        if (source.count > kFewParticles && expandable(source, group, allowed)) {
-          w.expansions.add(source, group.centre);
-        } else if (source.count > kFewParticles && visible_whole(source, group, allowed)) {
-          w.work.cells.add(source, group.centre);
+        const Opening how = source.count > kFewParticles ? opening(source, group, allowed) : Opening::kOpen;
+        if (how == Opening::kExpand) {
+          w.expansions.push_back(s);
+        } else if (how == Opening::kWhole) {
+          w.work.cells.push_back(s);
         } else if (source.is_leaf()) {
           w.work.add_range(source.begin, source.end);
           const Vec3d d = source.centre - group.centre;

@@ -9,40 +9,13 @@
 
 namespace breccia::gravity {
 
-/// Distant cells as the kernels read them.
-template <class Real>
-class CellList {
- public:
-  void clear() {
-    for (auto& c : component_) c.clear();
-  }
-  /// `cell` as seen from `origin`.
-  void add(const Cell& cell, Vec3d origin) {
-    const Vec3d x = cell.centre - origin;
-    const Moments<double>& m = cell.moments;
-    const double values[kCellComponents] = {x.x,         x.y,         x.z,         m.mass,      m.second.xx,
-                                            m.second.yy, m.second.zz, m.second.xy, m.second.xz, m.second.yz};
-    for (int c = 0; c < kCellComponents; ++c) component_[c].push_back(static_cast<Real>(values[c]));
-  }
-  /// Fills up to a whole number of registers with massless cells one unit away.
-  void pad() {
-    const auto size = static_cast<std::size_t>(lane_padded(static_cast<std::int64_t>(component_[0].size())));
-    for (int c = 0; c < kCellComponents; ++c) component_[c].resize(size, Real(c == 0 ? 1 : 0));
-  }
-  [[nodiscard]] CellArrays<Real> arrays() const {
-    CellArrays<Real> a{};
-    for (int c = 0; c < kCellComponents; ++c) a.component[c] = component_[c].data();
-    a.count = static_cast<std::int64_t>(component_[0].size());
-    return a;
-  }
-
- private:
-  std::vector<Real> component_[kCellComponents];
-};
+inline CellRefs refs(const std::vector<std::int32_t>& list, const Tree& tree) {
+  return {tree.cells.data(), list.data(), static_cast<std::int64_t>(list.size())};
+}
 
 template <class Real>
 struct Workspace {
-  CellList<Real> cells;
+  std::vector<std::int32_t> cells;
   std::vector<Range> ranges;
   std::vector<Real> reals;
   std::vector<double> doubles;
@@ -55,11 +28,11 @@ struct Workspace {
       ranges.push_back({begin, end});
     }
   }
-  /// Lets `task` use the lists and enough memory.
-  void lend_to(GroupTask<Real>& task) {
+  /// Lets `task` use the lists, of cells of `tree`, and enough memory.
+  void lend_to(GroupTask<Real>& task, const Tree& tree) {
     std::int64_t sources = 0;
     for (const Range r : ranges) sources += r.end - r.begin;
-    task.cells = cells.arrays();
+    task.cells = refs(cells, tree);
     task.ranges = ranges.data();
     task.range_count = static_cast<std::int64_t>(ranges.size());
     const std::int64_t targets = task.end - task.begin;

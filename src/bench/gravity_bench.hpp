@@ -8,13 +8,13 @@
 namespace breccia::bench {
 
 struct GravityBenchOptions {
-  bool quick = false;                  ///< 94,648 particles only
-  std::string states = "abc";          ///< of gravity_states.hpp
-  std::vector<std::int64_t> particles; ///< empty: 94,648 and, unless quick, 1e6
-  std::vector<double> openings;        ///< of the tree; empty: fast, default and tight
+  bool quick = false;                   ///< 94,648 particles only
+  std::string states = "abc";           ///< of gravity_states.hpp
+  std::vector<std::int64_t> particles;  ///< empty: 94,648 and, unless quick, 1e6
+  std::vector<double> openings;         ///< of the tree; empty: fast, default and tight
   int threads = 1;
-  int pairs = 5;                       ///< evaluations, each followed by a slice of the direct sum
-  std::string json;                    ///< file for the results, "-" for standard output, empty for none
+  int pairs = 5;     ///< evaluations, each followed by a slice of the direct sum
+  std::string json;  ///< file for the results, "-" for standard output, empty for none
 };
 
 /// Measures seconds of user CPU time, ratio to the float direct sum of the same run and errors against direct sums in

@@ -9,10 +9,10 @@
 namespace breccia::bench {
 
 struct GravityState {
-  std::vector<Vec3d> position;   ///< [m]
-  std::vector<double> mass;      ///< [kg]
-  std::int64_t body = 0;         ///< the first particles, so many, are one body
-  double softening = 0.0;        ///< 0.05 of the particles' spacing times two [m]
+  std::vector<Vec3d> position;  ///< [m]
+  std::vector<double> mass;     ///< [kg]
+  std::int64_t body = 0;        ///< the first particles, so many, are one body
+  double softening = 0.0;       ///< 0.05 of the particles' spacing times two [m]
 };
 
 /// a: two spheres of radius 50 km, centres 200 km apart. b: three quarters of the mass an ellipsoid with semi-axes 119,

@@ -17,6 +17,7 @@ void add_run(CLI::App& app, Action& action);
 void add_check(CLI::App& app, Action& action);
 void add_analyze(CLI::App& app, Action& action);
 void add_eos(CLI::App& app, Action& action);
+void add_gravity(CLI::App& app, Action& action);
 void add_info(CLI::App& app, Action& action);
 
 }  // namespace breccia::cli

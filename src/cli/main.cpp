@@ -21,6 +21,7 @@ void run_command_line(int argc, char** argv, const mpi::Comm& comm) {
   add_check(app, action);
   add_analyze(app, action);
   add_eos(app, action);
+  add_gravity(app, action);
   add_info(app, action);
   try {
     app.parse(argc, argv);
@@ -30,7 +31,7 @@ void run_command_line(int argc, char** argv, const mpi::Comm& comm) {
   } catch (const CLI::ParseError& error) {
     throw UsageError(std::string(error.what()) + "; see breccia --help");
   }
-  if (!action) throw UsageError("say what to do: run, check, analyze, eos or info; see breccia --help");
+  if (!action) throw UsageError("say what to do: run, check, analyze, gravity, eos or info; see breccia --help");
   action(comm);
 }
 

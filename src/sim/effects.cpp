@@ -24,11 +24,15 @@ EffectDecision decide(const char* name, Switch wish, bool automatic, const std::
 EffectDecision decide_gravity(const Scene& scene) {
   if (scene.effects.gravity == GravityMethod::kOff) return {"gravity", false, "the scene says so"};
   if (scene.effects.gravity == GravityMethod::kDirect) return {"gravity", true, "direct summation, the scene says so"};
+  if (scene.effects.gravity == GravityMethod::kTree) return {"gravity", true, "tree, the scene says so"};
+  if (scene.effects.gravity == GravityMethod::kTreePm) {
+    return {"gravity", true, "particle mesh and tree, the scene says so"};
+  }
   const double compactness = scene::compactness(scene);
   const bool on = compactness >= scene::kNegligibleCompactness;
   return {"gravity", on,
           fmt::format("G M/(R c0^2) = {:.2g} is {} {:.0e}{}", compactness, on ? "at least" : "below",
-                      scene::kNegligibleCompactness, on ? "; direct summation" : "")};
+                      scene::kNegligibleCompactness, on ? "; the cheapest method within gravity.error" : "")};
 }
 
 }  // namespace
@@ -61,7 +65,7 @@ ResolvedEffects resolve_effects(const Scene& scene) {
                       .energy = energy.on,
                       .fully_damaged = all_broken && strength.on};
   effects.gravity = gravity.on;
-  effects.gravity_method = gravity.on ? GravityMethod::kDirect : GravityMethod::kOff;
+  effects.gravity_method = gravity.on ? wish.gravity : GravityMethod::kOff;
   effects.decisions = {gravity, shear, strength, damage, viscosity, energy};
   return effects;
 }

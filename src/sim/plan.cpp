@@ -41,18 +41,52 @@ Scene thinned(const Scene& scene, double& scale) {
   return small;
 }
 
-double gravity_seconds(const Scene& scene, const ResolvedEffects& effects, const mpi::Comm& self) {
-  constexpr std::size_t kTargets = 4096;
-  std::vector<Vec3d> x(kTargets);
-  const std::vector<double> m(kTargets, 1.0);
-  for (std::size_t i = 0; i < kTargets; ++i) x[i] = {static_cast<double>(i), static_cast<double>(i * i % 4093), 0.0};
-  std::vector<Vec3d> acceleration(kTargets);
-  const auto solver = gravity::make_solver(effects.gravity_method, {1.0, scene.numerics.precision}, self, 1);
+std::uint64_t count_particles(const Scene& scene) {
+  std::uint64_t total = 0;
+  for (const BodyParameters& b : scene.bodies) total += b.particles;
+  return total;
+}
+
+// What the scene's method comes down to for its number of particles.
+GravityMethod gravity_method(const Scene& scene, const ResolvedEffects& effects) {
+  if (!effects.gravity) return GravityMethod::kOff;
+  return effects.gravity_method == GravityMethod::kAuto
+             ? gravity::cheapest_method(count_particles(scene), scene.gravity.error)
+             : effects.gravity_method;
+}
+
+const char* name_of(GravityMethod method) {
+  switch (method) {
+    case GravityMethod::kOff:
+      return "off";
+    case GravityMethod::kTree:
+      return "tree";
+    case GravityMethod::kTreePm:
+      return "treepm";
+    default:
+      return "direct";
+  }
+}
+
+// One evaluation, from a sample of evenly spread points: the direct sum grows with the square of their number.
+double gravity_seconds(const Scene& scene, GravityMethod method, const mpi::Comm& self) {
+  constexpr std::size_t kSample = 16'384;
+  std::vector<Vec3d> x(kSample);
+  const std::vector<double> m(kSample, 1.0);
+  for (std::size_t i = 0; i < kSample; ++i) {
+    const auto n = static_cast<double>(i);
+    x[i] = {std::fmod(0.8191725134 * n, 1.0), std::fmod(0.6710436067 * n, 1.0), std::fmod(0.5497004779 * n, 1.0)};
+  }
+  std::vector<Vec3d> acceleration(kSample);
+  const gravity::Parameters parameters{.softening = 1e-3,
+                                       .precision = scene.numerics.precision,
+                                       .error = scene.gravity.error,
+                                       .opening = scene.gravity.opening};
+  const auto solver = gravity::make_solver(method, parameters, self, 1);
   solver->evaluate({x, m}, acceleration, {});
   const double sample = seconds_of([&] { solver->evaluate({x, m}, acceleration, {}); });
-  double particles = 0.0;
-  for (const BodyParameters& b : scene.bodies) particles += static_cast<double>(b.particles);
-  return sample * particles * particles / (static_cast<double>(kTargets) * kTargets);
+  const double ratio = static_cast<double>(count_particles(scene)) / static_cast<double>(kSample);
+  return sample * (method == GravityMethod::kDirect ? ratio * ratio : ratio);
 }
 
 }  // namespace
@@ -61,7 +95,8 @@ Plan make_plan(const Scene& scene) {
   const ResolvedEffects effects = resolve_effects(scene);
   Plan plan;
   plan.effects = effects.decisions;
-  plan.gravity_method = effects.gravity ? "direct" : "off";
+  const GravityMethod method = gravity_method(scene, effects);
+  plan.gravity_method = name_of(method);
   const StepSize step = stable_step(scene, initial_speeds(scene, effects.material.shear), effects.material.viscosity);
   plan.time_step = step.seconds;
   plan.time_step_limited_by = step.limited_by;
@@ -88,7 +123,7 @@ double calibrate(const Scene& scene) {
                      for (int i = 0; i < kSteps; ++i) one_step();
                    }) /
                    kSteps * scale;
-  if (effects.gravity) seconds += gravity_seconds(scene, effects, self) / scene.gravity.interval;
+  if (effects.gravity) seconds += gravity_seconds(scene, gravity_method(scene, effects), self) / scene.gravity.interval;
   return seconds;
 }
 

@@ -9,7 +9,7 @@ class Options(CommandTest):
     def test_wrong_use_is_exit_2_with_one_line(self):
         scene = self.write_scene()
         cases = [
-            ([], "run, check, analyze, eos or info"),
+            ([], "run, check, analyze, gravity, eos or info"),
             (["fly"], "fly"),
             (["run"], "scene"),
             (["run", scene, "--colour", "red"], "--colour"),
