@@ -104,6 +104,8 @@ void FftPlan<Real>::operator()(Complex* data) const {
 template class FftPlan<float>;
 template class FftPlan<double>;
 
+const char* fft_library() { return fftwf_version; }
+
 int fft_friendly_length(int least) {
   for (int length = least < 2 ? 2 : least + least % 2;; length += 2) {
     int rest = length;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <complex>
+#include <cstddef>
 
 namespace breccia::gravity {
 
@@ -38,6 +39,9 @@ class FftPlan {
 
 /// Bytes that the arrays to be transformed are aligned to.
 inline constexpr std::size_t kFftAlignment = 64;
+
+/// Name and version of the FFT library.
+const char* fft_library();
 
 /// The smallest even length >= `least` with no prime factor above 7.
 int fft_friendly_length(int least);
