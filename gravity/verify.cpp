@@ -50,7 +50,7 @@ struct Deviation {
   double error, size;
 };
 
-FieldErrors statistics(std::vector<Deviation> all) {
+FieldErrors statistics(const std::vector<Deviation>& all) {
   FieldErrors result;
   result.targets = static_cast<std::int64_t>(all.size());
   if (all.empty()) return result;

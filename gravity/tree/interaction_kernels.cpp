@@ -1,7 +1,7 @@
 #include "breccia/pack.hpp"
 #include "gravity/rsqrt.hpp"
+#include "gravity/tree/group_loop.hpp"
 #include "gravity/tree/interactions.hpp"
-#include "gravity/tree/pair_loop.hpp"
 
 namespace breccia::gravity::BRECCIA_ISA {
 namespace {
@@ -9,43 +9,6 @@ namespace {
 // Square of the distance below which two particles without softening count as one: q^3 must stay finite.
 template <class Real>
 constexpr Real kCoincidentSquared = std::is_same_v<Real, float> ? Real(1e-24) : Real(1e-100);
-
-// Sums of the targets of one group, in double.
-struct Sums {
-  double* acceleration[3];
-  double* potential;
-
-  template <class V>
-  BRECCIA_HD void add(std::int64_t i, Vec3<V> a) const {
-    add_to(acceleration[0] + i, a.x);
-    add_to(acceleration[1] + i, a.y);
-    add_to(acceleration[2] + i, a.z);
-  }
-};
-
-// Coordinates relative to `centre` of particles [begin, end), written from `to` on; `stride` apart by component.
-template <class Real>
-void copy_relative(const MassArrays& from, std::int64_t begin, std::int64_t end, Vec3d centre, Real* to,
-                   std::int64_t stride, bool low) {
-  const double origin[3] = {centre.x, centre.y, centre.z};
-  for (int axis = 0; axis < 3; ++axis) {
-    const double* x = from.position[axis] + begin;
-    Real* high = to + axis * stride;
-    const double o = origin[axis];
-    for (std::int64_t k = 0; k < end - begin; ++k) high[k] = static_cast<Real>(x[k] - o);
-    if (!low) continue;
-    Real* rest = to + (3 + axis) * stride;
-    for (std::int64_t k = 0; k < end - begin; ++k) {
-      rest[k] = static_cast<Real>((x[k] - o) - static_cast<double>(high[k]));
-    }
-  }
-}
-
-template <class Real>
-Relative<Real> relative(const Real* first, std::int64_t stride, const Real* mass) {
-  return {
-      {first, first + stride, first + 2 * stride}, {first + 3 * stride, first + 4 * stride, first + 5 * stride}, mass};
-}
 
 template <class V, bool kPotential>
 void add_far(const LocalExpansion<double>& far, const Relative<typename V::Scalar>& targets, std::int64_t padded,
@@ -100,43 +63,18 @@ void add_cells(const CellRefs& cells, Vec3d centre, const Relative<typename V::S
   }
 }
 
-template <class V, bool kLow, bool kPotential, bool kSelf, class Pair>
-void add_sources(const Relative<typename V::Scalar>& targets, std::int64_t padded,
-                 const Relative<typename V::Scalar>& sources, std::int64_t first, std::int64_t last, const Pair& pair,
-                 const Sums& sums) {
-  for (std::int64_t begin = first; begin < last; begin += kSourceBlock) {
-    const std::int64_t end = begin + kSourceBlock < last ? begin + kSourceBlock : last;
-    for (std::int64_t i = 0; i < padded; i += V::kLanes) {
-      const PairSums<V> s = sum_pairs_of<V, kLow, kPotential, kSelf>(targets, i, sources, begin, end, pair);
-      sums.add(i, s.acceleration);
-      if constexpr (kPotential) add_to(sums.potential + i, s.potential);
-    }
-  }
-}
-
-template <class V, bool kLow, bool kPotential, bool kGuarded>
+template <class V, bool kLow, bool kPotential>
 void add_particles(const GroupTask<typename V::Scalar>& task, const Relative<typename V::Scalar>& targets,
                    std::int64_t padded, typename V::Scalar* memory, const Sums& sums) {
   using Real = typename V::Scalar;
-  std::int64_t total = 0;
-  for (std::int64_t r = 0; r < task.range_count; ++r) total += task.ranges[r].end - task.ranges[r].begin;
-  Real* mass = memory + 6 * total;
-  std::int64_t at = 0;
-  for (std::int64_t r = 0; r < task.range_count; ++r) {
-    const Range range = task.ranges[r];
-    copy_relative(task.sources, range.begin, range.end, task.centre, memory + at, total, kLow);
-    for (std::int64_t j = range.begin; j < range.end; ++j) mass[at++] = static_cast<Real>(task.sources.mass[j]);
+  const V softening_squared(task.softening_squared);
+  if (task.softening_squared <= kCoincidentSquared<Real>) {
+    const NewtonPair<V, true> pair{softening_squared, V(kCoincidentSquared<Real>)};
+    add_ranges<V, kLow, kPotential>(task, targets, padded, memory, pair, sums);
+  } else {
+    const NewtonPair<V, false> pair{softening_squared, V{}};
+    add_ranges<V, kLow, kPotential>(task, targets, padded, memory, pair, sums);
   }
-  const Relative<Real> sources = relative<Real>(memory, total, mass);
-  const NewtonPair<V, kGuarded> pair{V(task.softening_squared), V(kCoincidentSquared<Real>)};
-  std::int64_t others = 0;
-  if constexpr (kPotential && !kGuarded) {
-    if (task.self) {
-      others = task.end - task.begin;
-      add_sources<V, kLow, kPotential, true>(targets, padded, sources, 0, others, pair, sums);
-    }
-  }
-  add_sources<V, kLow, kPotential, false>(targets, padded, sources, others, total, pair, sums);
 }
 
 template <class V, bool kPotential>
@@ -154,15 +92,10 @@ void evaluate_as(const GroupTask<typename V::Scalar>& task) {
 
   if (task.far != nullptr) add_far<V, kPotential>(*task.far, targets, padded, sums);
   add_cells<V, kPotential>(task.cells, task.centre, targets, padded, V(task.softening_squared), sums);
-  const bool guarded = task.softening_squared <= kCoincidentSquared<Real>;
   if (low) {
-    if constexpr (std::is_same_v<Real, float>) {
-      guarded ? add_particles<V, true, kPotential, true>(task, targets, padded, memory, sums)
-              : add_particles<V, true, kPotential, false>(task, targets, padded, memory, sums);
-    }
+    if constexpr (std::is_same_v<Real, float>) add_particles<V, true, kPotential>(task, targets, padded, memory, sums);
   } else {
-    guarded ? add_particles<V, false, kPotential, true>(task, targets, padded, memory, sums)
-            : add_particles<V, false, kPotential, false>(task, targets, padded, memory, sums);
+    add_particles<V, false, kPotential>(task, targets, padded, memory, sums);
   }
   for (int axis = 0; axis < 3; ++axis) {
     for (std::int64_t k = 0; k < count; ++k) task.acceleration[axis][task.begin + k] += sums.acceleration[axis][k];

@@ -60,10 +60,10 @@ class Walker {
 
     std::vector<Walking<Real>> walking(static_cast<std::size_t>(settings_.threads));
 #pragma omp parallel for num_threads(settings_.threads) schedule(dynamic)
-    for (std::size_t b = 0; b < branches_.size(); ++b) {
+    for (const Branch& branch : branches_) {
       Walking<Real>& mine = walking[static_cast<std::size_t>(omp_get_thread_num())];
-      mine.candidates = branches_[b].candidates;
-      descend(mine, branches_[b].cell, {0, mine.candidates.size()}, branches_[b].far, false);
+      mine.candidates = branch.candidates;
+      descend(mine, branch.cell, {0, mine.candidates.size()}, branch.far, false);
     }
     InteractionCounts counts = trunk.counts;
     for (const Walking<Real>& w : walking) counts += w.counts;

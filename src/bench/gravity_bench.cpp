@@ -129,14 +129,17 @@ Measured measure(const GravityState& state, const Reference& reference, DirectSl
   return best;
 }
 
+// The levels of gravity.md 7, or the openings asked for.
 std::vector<Setting> settings(const GravityBenchOptions& options, double softening) {
-  std::vector<double> openings = options.openings;
-  if (openings.empty()) openings = {1e-2, 1e-3, 1e-4};
   std::vector<Setting> list;
-  for (const double opening : openings) {
-    gravity::Parameters p;
-    p.softening = softening;
-    p.opening = opening;
+  if (options.openings.empty()) {
+    for (const double error : {1e-3, 3.5e-4, 1.2e-4}) {
+      const gravity::Parameters p{.softening = softening, .error = error};
+      list.push_back({"tree", fmt::format("error {:.1e}", error), GravityMethod::kTree, p});
+    }
+  }
+  for (const double opening : options.openings) {
+    const gravity::Parameters p{.softening = softening, .opening = opening};
     list.push_back({"tree", fmt::format("opening {:.1e}", opening), GravityMethod::kTree, p});
   }
   for (const double error : {gravity::Parameters{}.error, 1e-4}) {

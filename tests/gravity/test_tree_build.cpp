@@ -3,10 +3,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numeric>
+#include <type_traits>
 
 #include "deal_out.hpp"
+#include "gravity/tree/near.hpp"
+#include "gravity/tree/scales.hpp"
 #include "gravity/tree/tree.hpp"
+#include "gravity/tree/walk.hpp"
 
 namespace breccia::gravity {
 namespace {
@@ -105,6 +108,66 @@ TEST(Tree, GroupsAreAtLeastAThirdFullOnAverage) {
       at = tree.cell(g).end;
     }
     EXPECT_EQ(at, 20'000);
+  }
+}
+
+Cloud part(const Cloud& cloud, std::size_t begin, std::size_t end) {
+  const auto slice = [&](const auto& v) {
+    return std::remove_cvref_t<decltype(v)>(v.begin() + static_cast<std::ptrdiff_t>(begin),
+                                            v.begin() + static_cast<std::ptrdiff_t>(end));
+  };
+  return {slice(cloud.position), slice(cloud.mass)};
+}
+
+// One rule for sets (gravity.md 5.2): the field of a whole is the sum over pairs of sets, each with its own tree.
+TEST(Walk, SetsWithTreesOfTheirOwnAddUp) {
+  const std::size_t n = 3000;
+  const Cloud cloud = two_spheres(n);
+  const Tree first = built(part(cloud, 0, n / 3));
+  const Tree second = built(part(cloud, n / 3, n));
+  const mpi::Comm self(MPI_COMM_SELF);
+  const Vec3d far{1e6, 1e6, 1e6};
+  const double unit = random_root(-far, far).unit;
+  const WalkSettings settings{.tolerance = 2e-4, .softening = 125.0 / unit, .threads = 1};
+  FieldSums sums;
+  sums.reset(first.particles.size(), true);
+  const std::vector<double> scales = acceleration_scales(first, settings.softening, 1, self);
+  for (const Tree* sources : {&first, &second}) walk<float>(first, scales, *sources, settings, sums);
+
+  const Field plain = plain_sum(cloud, 125.0);
+  std::vector<Vec3d> a(n / 3), exact(n / 3);
+  double worst = 0.0;
+  for (std::size_t k = 0; k < a.size(); ++k) {
+    const auto i = static_cast<std::size_t>(first.particles.order[k]);
+    const double g = kGravitationalConstant * 1e13 / (unit * unit);
+    a[k] = g * Vec3d{sums.acceleration[0][k], sums.acceleration[1][k], sums.acceleration[2][k]};
+    exact[k] = plain.acceleration[i];
+    worst =
+        std::max(worst, std::abs(kGravitationalConstant * 1e13 / unit * sums.potential[k] / plain.potential[i] - 1));
+  }
+  EXPECT_LT(rms_error(a, exact), 3.5e-4);
+  EXPECT_LT(worst, 1e-3);
+}
+
+TEST(Near, ListsEveryParticleWithinTheCutoffOnce) {
+  const Tree tree = built(two_spheres(4000));
+  const double cutoff = 8.0;
+  Workspace<float> work;
+  std::vector<std::int32_t> stack;
+  for (const std::int32_t g : tree.groups()) {
+    const Cell& group = tree.cell(g);
+    list_near(tree, group, true, cutoff, stack, work);
+    std::vector<int> listed(4000, 0);
+    for (const Range r : work.ranges) {
+      for (std::int32_t j = r.begin; j < r.end; ++j) ++listed[static_cast<std::size_t>(j)];
+    }
+    EXPECT_EQ(work.ranges.front().begin, group.begin);
+    EXPECT_EQ(*std::max_element(listed.begin(), listed.end()), 1);
+    for (std::int64_t j = 0; j < 4000; ++j) {
+      const Vec3d d = tree.particles.position(j) - tree.particles.position(group.begin);
+      if (dot(d, d) >= cutoff * cutoff) continue;
+      EXPECT_EQ(listed[static_cast<std::size_t>(j)], 1);
+    }
   }
 }
 
