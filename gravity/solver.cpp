@@ -6,6 +6,7 @@
 #include "breccia/error.hpp"
 #include "gravity/auto_solver.hpp"
 #include "gravity/direct_sum.hpp"
+#include "gravity/mesh/tree_pm.hpp"
 #include "gravity/tree/tree_solver.hpp"
 
 namespace breccia::gravity {
@@ -43,7 +44,10 @@ std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& para
     case GravityMethod::kTree:
       return std::make_unique<TreeSolver>(parameters, comm, threads);
     case GravityMethod::kTreePm:
-      throw UsageError("effects.gravity = treepm: this version has no particle mesh; use tree");
+      if (parameters.precision == Precision::kDouble) {
+        return std::make_unique<TreePm<double>>(parameters, comm, threads);
+      }
+      return std::make_unique<TreePm<float>>(parameters, comm, threads);
   }
   throw UsageError("effects.gravity: unknown method; use auto");
 }

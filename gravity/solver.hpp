@@ -6,6 +6,7 @@
 
 #include "breccia/linalg.hpp"
 #include "breccia/scene.hpp"
+#include "gravity/mesh/phases.hpp"
 #include "mpi/comm.hpp"
 
 namespace breccia::gravity {
@@ -16,9 +17,22 @@ struct ParticlesView {
   std::span<const double> mass;     ///< [kg]
 };
 
+/// Of the particle mesh (gravity.md 5.3).
+struct MeshParameters {
+  double particle_spacing = 0.0;  ///< mean distance of the particles where they are dense [m]; 0: found from them
+  double cell = 0.0;              ///< [m]; 0: kCellsPerSpacing particle spacings
+  double split = 0.0;             ///< scale rs of the Gaussian split [cells]; 0: follows from Parameters::error
+  double cutoff = 0.0;            ///< of the short-range part [rs]; 0: follows from the split
+};
+
+/// Not near 1: a lattice of particles beats with a mesh of its own spacing. Larger cells also balance the cost of
+/// pairs and transforms.
+inline constexpr double kCellsPerSpacing = 1.3;
+
 struct Parameters {
   double softening = 0.0;  ///< Plummer length: a pair at distance r counts with 1/sqrt(r^2 + softening^2) [m]
   Precision precision = Precision::kMixed;
+  MeshParameters mesh{};
   double error = 3.5e-4;  ///< rms of |da|/|a| that is good enough
   double opening = 0.0;   ///< tree: error allowed to one cell, as a fraction of the acceleration; 0: follows from error
 };
@@ -31,6 +45,8 @@ struct Stats {
   double cell_interactions = 0.0;  ///< particle with cell
   double expansions = 0.0;         ///< cell with cell
   double bytes_sent = 0.0;
+  int boxes = 0;                ///< that have a mesh
+  Phases phases;                ///< of treepm
   Vec3d net_force_removed{};    ///< sum(m a) that was subtracted from all accelerations [N]; zero for a pairwise sum
   double momentum_error = 0.0;  ///< |sum(m a)| / sum(m |a|) over all ranks
 };

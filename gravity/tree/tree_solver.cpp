@@ -25,13 +25,13 @@ Root common_root(ParticlesView particles, const mpi::Comm& comm) {
   return low.x <= high.x ? random_root(low, high) : Root{};
 }
 
+}  // namespace
+
 // Measured in states a and b of gravity.md 3: openings of 1.2e-4, 2e-4, 6e-4, 1e-3 leave rms errors of 2.3e-4, 2.9e-4,
 // 5.4e-4, 8.4e-4; few or randomly placed particles have up to half as much again.
 double opening_for(const Parameters& parameters) {
   return parameters.opening > 0.0 ? parameters.opening : 1.2e-4 * std::pow(parameters.error / 3.5e-4, 1.9);
 }
-
-}  // namespace
 
 TreeSolver::TreeSolver(const Parameters& parameters, const mpi::Comm& comm, int threads)
     : parameters_(parameters), comm_(comm), threads_(std::max(threads, 1)) {}

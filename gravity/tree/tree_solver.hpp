@@ -8,6 +8,9 @@
 
 namespace breccia::gravity {
 
+/// Parameters::opening, or what leaves Parameters::error.
+double opening_for(const Parameters& parameters);
+
 /// Dual-tree walk with local expansions of the fourth order (gravity.md 5.3). Every rank holds all particles and sums
 /// the field of its share of them, a stretch of the Morton curve whatever the slabs of the caller: the tree, and with
 /// it the field, is then the same to rounding on any number of ranks (bit for bit on any number of threads), and the

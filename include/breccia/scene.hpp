@@ -72,6 +72,8 @@ struct GravityParameters {
   double softening = 0.0;  ///< Plummer length [m]; default 0.05 cell
   double error = 3.5e-4;   ///< rms relative error of the acceleration that is good enough
   double opening = 0.0;    ///< tree: error allowed to one cell; 0: follows from `error`
+  double mesh = 0.0;       ///< treepm: mesh cell [m]; 0: follows from the particles' spacing
+  double split = 0.0;      ///< treepm: scale of the split [mesh cells]; 0: follows from `error`
   Vec3d uniform{};         ///< constant field [m/s2]
 };
 

@@ -50,11 +50,11 @@ Measured measure(const EngineCase& c, const EffectChoice& effects, Precision pre
   Measured best;
   double spent = 0.0;
   for (int cycle = 0; cycle < 3 || spent < seconds; ++cycle) {
-    const double user = user_seconds();
+    const double user = now().user;
     const double wall = MPI_Wtime();
     one_cycle(*engine, dt, interval);
     const double elapsed = MPI_Wtime() - wall;
-    best.rate = std::max(best.rate, steps / (user_seconds() - user));
+    best.rate = std::max(best.rate, steps / (now().user - user));
     best.wall_rate = std::max(best.wall_rate, steps / elapsed);
     spent += elapsed;
   }

@@ -142,6 +142,12 @@ std::vector<Setting> settings(const GravityBenchOptions& options, double softeni
     const gravity::Parameters p{.softening = softening, .opening = opening};
     list.push_back({"tree", fmt::format("opening {:.1e}", opening), GravityMethod::kTree, p});
   }
+  for (const double error : {gravity::Parameters{}.error, 1e-4}) {
+    gravity::Parameters p;
+    p.softening = softening;
+    p.error = error;
+    list.push_back({"treepm", fmt::format("error {:.1e}", error), GravityMethod::kTreePm, p});
+  }
   return list;
 }
 

@@ -55,11 +55,16 @@ void apply(const std::string& setting, gravity::Parameters& parameters) {
       parameters.error = quantity(value, scene::kPure, "a number");
     } else if (key == "gravity.opening") {
       parameters.opening = quantity(value, scene::kPure, "a number");
+    } else if (key == "gravity.mesh") {
+      parameters.mesh.cell = quantity(value, scene::kLength, "a length such as \"2 km\"");
+    } else if (key == "gravity.split") {
+      parameters.mesh.split = quantity(value, scene::kPure, "a number");
     } else if (key == "numerics.precision" && (value == "mixed" || value == "double")) {
       parameters.precision = value == "mixed" ? Precision::kMixed : Precision::kDouble;
     } else {
       throw UsageError(
-          "there are gravity.softening, gravity.error, gravity.opening and numerics.precision (mixed or double)");
+          "there are gravity.softening, gravity.error, gravity.opening, gravity.mesh, gravity.split and "
+          "numerics.precision (mixed or double)");
     }
   } catch (const UsageError& error) {
     throw UsageError("--set " + setting + ": " + error.what());
@@ -181,7 +186,9 @@ void add_gravity(CLI::App& app, Action& action) {
       ->required()
       ->type_name("PARTICLES");
   command.add_option("--method", options->method, "direct, tree, treepm or auto [auto]")->option_text("METHOD");
-  command.add_option("--set", options->settings, "gravity.softening, gravity.error, gravity.opening; may be repeated")
+  command
+      .add_option("--set", options->settings,
+                  "gravity.softening, gravity.error, gravity.opening, gravity.mesh, gravity.split; may be repeated")
       ->option_text("KEY=VALUE");
   command.add_option("--out", options->out, "File for /PartType0/Acceleration [m/s2] and Potential [J/kg]")
       ->required()

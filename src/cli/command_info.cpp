@@ -2,6 +2,7 @@
 
 #include "breccia/precision.hpp"
 #include "cli/command.hpp"
+#include "gravity/mesh/fft_plan.hpp"
 #include "io/machine.hpp"
 
 namespace breccia::cli {
@@ -11,7 +12,7 @@ void print_info(const mpi::Comm& comm) {
   const io::Machine machine = io::this_machine();
   if (!comm.is_root()) return;
   for (const auto& [name, version] : io::library_versions()) fmt::print("{:<9} {}\n", name, version);
-  fmt::print("fftw      not in this build: gravity is a direct sum or a tree\n");
+  fmt::print("fftw      {}\n", gravity::fft_library());
   fmt::print("simd      {}: {} floats or {} doubles at a time\n", machine.instruction_set, MixedPrecision::kLanes,
              DoublePrecision::kLanes);
   fmt::print("cuda      not in this build\n");

@@ -70,9 +70,9 @@ Scene resolve(Draft& draft, const Document& document, const mpi::Comm* comm) {
   scene.gravity.softening = *draft.softening;
   if (!draft.diagnostics) draft.diagnostics = scene.time.end / 200.0;
   scene.output.diagnostics_interval = *draft.diagnostics;
-  if (scene.effects.gravity == GravityMethod::kTreePm)
-    fail(document, "effects.gravity",
-         "this build has no particle mesh; write \"tree\", \"auto\", \"direct\" or \"off\"");
+  if (scene.gravity.split != 0.0 && scene.gravity.split < 0.6)
+    fail(document, "gravity.split",
+         "the mesh resolves no split below 0.6 cells; leave it out to let gravity.error decide");
 
   resolve_materials(draft, scene, document);
   resolve_bodies(draft, scene, document, comm);

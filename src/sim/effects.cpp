@@ -25,6 +25,9 @@ EffectDecision decide_gravity(const Scene& scene) {
   if (scene.effects.gravity == GravityMethod::kOff) return {"gravity", false, "the scene says so"};
   if (scene.effects.gravity == GravityMethod::kDirect) return {"gravity", true, "direct summation, the scene says so"};
   if (scene.effects.gravity == GravityMethod::kTree) return {"gravity", true, "tree, the scene says so"};
+  if (scene.effects.gravity == GravityMethod::kTreePm) {
+    return {"gravity", true, "particle mesh and tree, the scene says so"};
+  }
   const double compactness = scene::compactness(scene);
   const bool on = compactness >= scene::kNegligibleCompactness;
   return {"gravity", on,

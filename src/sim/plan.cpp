@@ -55,6 +55,19 @@ GravityMethod gravity_method(const Scene& scene, const ResolvedEffects& effects)
              : effects.gravity_method;
 }
 
+const char* name_of(GravityMethod method) {
+  switch (method) {
+    case GravityMethod::kOff:
+      return "off";
+    case GravityMethod::kTree:
+      return "tree";
+    case GravityMethod::kTreePm:
+      return "treepm";
+    default:
+      return "direct";
+  }
+}
+
 // One evaluation, from a sample of evenly spread points: the direct sum grows with the square of their number.
 double gravity_seconds(const Scene& scene, GravityMethod method, const mpi::Comm& self) {
   constexpr std::size_t kSample = 16'384;
@@ -83,7 +96,7 @@ Plan make_plan(const Scene& scene) {
   Plan plan;
   plan.effects = effects.decisions;
   const GravityMethod method = gravity_method(scene, effects);
-  plan.gravity_method = method == GravityMethod::kOff ? "off" : (method == GravityMethod::kTree ? "tree" : "direct");
+  plan.gravity_method = name_of(method);
   const StepSize step = stable_step(scene, initial_speeds(scene, effects.material.shear), effects.material.viscosity);
   plan.time_step = step.seconds;
   plan.time_step_limited_by = step.limited_by;

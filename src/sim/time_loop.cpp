@@ -7,6 +7,20 @@
 #include "sim/setup.hpp"
 
 namespace breccia::sim {
+namespace {
+
+// Mean distance of the particles in all bodies, as they were made: a restarted run must find the same [m].
+double mean_spacing(const Scene& scene) {
+  double volume = 0.0;
+  double particles = 0.0;
+  for (const BodyParameters& b : scene.bodies) {
+    volume += b.mass / scene.materials[b.material].eos.rho0;
+    particles += static_cast<double>(b.particles);
+  }
+  return particles > 0.0 ? std::cbrt(volume / particles) : 0.0;
+}
+
+}  // namespace
 
 TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm)
     : scene_(scene),
@@ -19,10 +33,12 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
   dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
   set_sort_interval(speeds.particle * dt_ / scene_.cell);
   if (effects.gravity) {
-    const gravity::Parameters parameters{.softening = scene.gravity.softening,
-                                         .precision = scene.numerics.precision,
-                                         .error = scene.gravity.error,
-                                         .opening = scene.gravity.opening};
+    const gravity::Parameters parameters{
+        .softening = scene.gravity.softening,
+        .precision = scene.numerics.precision,
+        .mesh = {.particle_spacing = mean_spacing(scene), .cell = scene.gravity.mesh, .split = scene.gravity.split},
+        .error = scene.gravity.error,
+        .opening = scene.gravity.opening};
     solver_ = gravity::make_solver(effects.gravity_method, parameters, comm, threads);
     evaluate_gravity();
   }

@@ -174,7 +174,6 @@ TEST(DirectSum, CountsPairsAndBytes) {
 
 TEST(MakeSolver, RefusesWhatIsNotThere) {
   const mpi::Comm comm;
-  EXPECT_THROW(make_solver(GravityMethod::kTreePm, {}, comm, 1), UsageError);
   EXPECT_THROW(make_solver(GravityMethod::kOff, {}, comm, 1), UsageError);
   EXPECT_THROW(make_solver(GravityMethod::kDirect, {-1.0, Precision::kMixed}, comm, 1), UsageError);
   EXPECT_NE(make_solver(GravityMethod::kAuto, {}, comm, 1), nullptr);

@@ -179,8 +179,9 @@ TEST(Parse, UnknownKeysAndSections) {
   EXPECT_EQ(usage_error(kSphere + "[outptu]\n"), "scene.toml:8: unknown section \"outptu\"; did you mean \"output\"?");
   EXPECT_NE(usage_error("[body]\nradius = \"1 m\"\n").find("write [[body]]"), std::string::npos);
   // Keys of methods this build does not have are unknown, not ignored.
-  EXPECT_NE(usage_error(kSphere + "[gravity]\nmesh = 0.5\n").find("unknown key \"gravity.mesh\""), std::string::npos);
-  EXPECT_NE(usage_error(kSphere + "[effects]\ngravity = \"treepm\"\n").find("no particle mesh"), std::string::npos);
+  EXPECT_NE(usage_error(kSphere + "[gravity]\nrefinement = 2\n").find("unknown key \"gravity.refinement\""),
+            std::string::npos);
+  EXPECT_NE(usage_error(kSphere + "[gravity]\nsplit = 0.3\n").find("below 0.6 cells"), std::string::npos);
 }
 
 TEST(Parse, WrongValuesNameFileLineAndKey) {

@@ -1,0 +1,23 @@
+// Which parts of space get a particle mesh: boxes around the dense bodies (gravity.md 5.2).
+#pragma once
+
+#include <vector>
+
+#include "gravity/mesh/geometry.hpp"
+#include "gravity/solver.hpp"
+
+namespace breccia::gravity {
+
+inline constexpr std::size_t kMostBoxes = 4;
+
+/// Up to kMostBoxes boxes that do not overlap, the heaviest body first: bounds of the connected regions filled to at
+/// least an eighth at mean distance `spacing` [m] that hold a tenth of the mass and 1000 particles. Boxes that overlap
+/// become one, and so do boxes that share a mesh of `cell` [m] at less than twice the cost of two. The same on all
+/// ranks, and but for rounding the same for any distribution of the particles. Collective.
+std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double cell, const mpi::Comm& comm);
+
+/// Mean distance of the particles where they are dense [m]: from the number of neighbours that the median particle has
+/// in its block of space. 1 if there are fewer than two places. Collective.
+double dense_spacing(ParticlesView particles, const mpi::Comm& comm);
+
+}  // namespace breccia::gravity
