@@ -79,7 +79,7 @@ void HostEngine<P>::connect_tiles() {
   }
   sums_.resize(nodes);
   velocities_.resize(nodes);
-  rows_.assign(blocks_.size(), 0);
+  rows_.assign(blocks_.size(), RowMask{});
   boundaries_.find_nodes(std::span(blocks_.keys()).first(owned_blocks_));
 }
 

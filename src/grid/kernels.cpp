@@ -98,14 +98,14 @@ BRECCIA_HD void update_nodes(const NodeArguments<P>& a, std::size_t first, std::
 template <class P>
 void update_blocks(const NodeArguments<P>& a, std::uint32_t first, std::uint32_t last) {
   for (std::size_t block = first; block < last; ++block) {
-    const RowMask rows = a.rows[block];
-    a.rows[block] = 0;
-    if (rows == kAllRows) {
+    const unsigned rows = a.rows[block].half[0] | static_cast<unsigned>(a.rows[block].half[1]) << 8;
+    a.rows[block] = {};
+    if (rows == 0xffffU) {
       update_nodes(a, block * kBlockNodes, kBlockNodes);
       continue;
     }
     for (std::size_t row = 0; row < kBlockNodes / kBlockWidth; ++row) {
-      if ((rows >> row & 1) != 0) update_nodes(a, block * kBlockNodes + row * kBlockWidth, kBlockWidth);
+      if ((rows >> row & 1U) != 0) update_nodes(a, block * kBlockNodes + row * kBlockWidth, kBlockWidth);
     }
   }
 }

@@ -23,9 +23,12 @@ constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTil
 inline constexpr int kNodeBias = 8;  ///< keeps the 8-bit tile coordinates positive
 inline constexpr std::uint32_t kNoBlock = 0xffffffffU;
 
-/// Which of the 16 rows along z of a block, row 4 x + y, hold something.
-using RowMask = std::uint16_t;
-inline constexpr RowMask kAllRows = 0xffff;
+/// Which rows along z of a block hold something: bit 4 x + y of half 0 for x = 0, 1, and 4 (x - 2) + y of half 1. Tiles on
+/// both sides of a block may mark it at the same time, each its own half.
+struct RowMask {
+  std::uint8_t half[2] = {0, 0};
+};
+inline constexpr RowMask kAllRows{{0xff, 0xff}};
 
 /// Channels of a node. Sums while particles scatter, velocities after the grid update.
 inline constexpr int kChannels = 8;

@@ -100,7 +100,11 @@ BRECCIA_HD void mark_rows(const Tile& tile, const TileBox& box, RowMask* rows) {
       for (int bz = 0; bz < 3; ++bz) {
         const std::uint32_t block = tile.neighbours[(bx * 3 + by) * 3 + bz];
         if (block == kNoBlock || touched(2, bz) == 0) continue;
-        rows[block] = static_cast<RowMask>(rows[block] | mask);
+        for (int h = 0; h < 2; ++h) {
+          std::uint8_t& half = rows[block].half[h];
+          const unsigned here = mask >> (8 * h) & 0xffU;
+          if (here != 0) half = static_cast<std::uint8_t>(half | here);
+        }
       }
     }
   }
