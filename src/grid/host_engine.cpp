@@ -61,6 +61,7 @@ template <class P>
 PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
   PassArguments<P> a;
   a.tiles = tiles_.data();
+  a.tile_count = static_cast<std::uint32_t>(tiles_.size());
   a.boxes = boxes_.data();
   a.kinematics = store_.kinematics.data();
   a.volume = store_.volume.data();

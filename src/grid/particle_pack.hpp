@@ -19,18 +19,28 @@ struct GridVelocity {
 template <class P, class Fx>
 BRECCIA_HD material::State<typename P::RealPack> load_state(const PassArguments<P>& a, const Fx& fx, std::size_t i) {
   using T = typename P::RealPack;
-  material::State<T> s{};
+  const T zero(typename P::Real(0));
+  // Member by member: clearing all of it first would be a call or a slow string instruction.
+  material::State<T> s;
   s.volume = a.volume[i].change;
   s.kirchhoff_pressure = a.volume[i].kirchhoff_pressure;
   if (fx.shear) {
     const T* e = a.elastic[i].strain;
     s.elastic = {e[0], e[1], e[2], e[3], e[4]};
+  } else {
+    s.elastic = {zero, zero, zero, zero, zero};
   }
-  if (fx.energy) s.energy = a.energy[i].specific;
-  if ((fx.strength || fx.damage) && !fx.fully_damaged) s.damage_root = a.damage_level[i].root;
+  if (fx.energy) {
+    s.energy = a.energy[i].specific;
+  } else {
+    s.energy.set(zero);
+  }
+  s.damage_root = (fx.strength || fx.damage) && !fx.fully_damaged ? a.damage_level[i].root : zero;
   if (fx.damage) {
     const T* t = a.flaws[i].total;
     s.total = {t[0], t[1], t[2], t[3], t[4], t[5]};
+  } else {
+    s.total = {zero, zero, zero, zero, zero, zero};
   }
   return s;
 }

@@ -86,6 +86,7 @@ struct PassArguments {
   using Real = typename P::Real;
 
   const Tile* tiles = nullptr;
+  std::uint32_t tile_count = 0;
   TileBox* boxes = nullptr;  ///< written by a scatter, read by the gather after it
   Kinematics<P>* kinematics = nullptr;
   Volume<P>* volume = nullptr;

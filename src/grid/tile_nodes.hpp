@@ -66,6 +66,19 @@ BRECCIA_HD void load_tile(const Tile& tile, const TileBox& box, const typename P
   });
 }
 
+/// Asks for the nodes of a box ahead of their use; `write`: they will be added to.
+template <class P, int kWrite>
+BRECCIA_HD void prefetch_tile(const Tile& tile, const TileBox& box, const typename P::Real* blocks) {
+  constexpr std::size_t kLine = 64;
+  detail::for_each_pair(tile, box, [&](std::uint32_t block, int in_block, int) BRECCIA_INLINE_LAMBDA {
+    if (block == kNoBlock) return;
+    const auto* pair = reinterpret_cast<const char*>(blocks + detail::at(block, in_block));
+    for (std::size_t line = 0; line < sizeof(detail::TwoNodes<P>); line += kLine) {
+      __builtin_prefetch(pair + line, kWrite, 2);
+    }
+  });
+}
+
 /// Adds the nodes of the box to their blocks. Returns true if mass has reached a block that no particle of the tile
 /// could reach at the last sorting: a particle has drifted more than the margin allows.
 template <class P>

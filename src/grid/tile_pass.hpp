@@ -28,6 +28,10 @@ class TileGrid {
   BRECCIA_HD void load(std::uint32_t tile) {
     if (a_.gather) load_tile<P>(a_.tiles[tile], a_.boxes[tile], a_.velocities, scratch_.velocities);
     if (a_.scatter) clear_tile<P>(a_.gather ? a_.boxes[tile] : kWholeTile, scratch_.sums);
+    if (a_.gather && a_.scatter && tile + 1 < a_.tile_count) {
+      prefetch_tile<P, 0>(a_.tiles[tile + 1], a_.boxes[tile + 1], a_.velocities);
+      prefetch_tile<P, 1>(a_.tiles[tile + 1], a_.boxes[tile + 1], a_.sums);
+    }
   }
 
   BRECCIA_HD void store(std::uint32_t tile, TileReport& report) {
