@@ -7,8 +7,9 @@
 #include "breccia/error.hpp"
 #include "mpi/comm.hpp"
 
-int main(int argc, char** argv) {
-  const breccia::mpi::Environment environment(&argc, &argv);
+namespace {
+
+int measure(int argc, char** argv) {
   CLI::App app("Measures the speed of breccia on this machine");
   app.require_subcommand(1);
   breccia::bench::EngineBenchOptions options;
@@ -31,13 +32,25 @@ int main(int argc, char** argv) {
   gravity->add_option("--json", gravity_options.json, "file for the results, - for standard output");
   try {
     app.parse(argc, argv);
-    if (engine->parsed()) breccia::bench::run_engine_bench(options);
-    if (gravity->parsed()) breccia::bench::run_gravity_bench(gravity_options);
   } catch (const CLI::ParseError& e) {
     return app.exit(e) == 0 ? 0 : static_cast<int>(breccia::ExitCode::kUsage);
+  }
+  if (engine->parsed()) breccia::bench::run_engine_bench(options);
+  if (gravity->parsed()) breccia::bench::run_gravity_bench(gravity_options);
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const breccia::mpi::Environment environment(&argc, &argv);
+  try {
+    return measure(argc, argv);
   } catch (const breccia::Error& e) {
     std::fprintf(stderr, "breccia_bench: error: %s\n", e.what());
     return static_cast<int>(e.code());
+  } catch (const std::exception& e) {
+    std::fprintf(stderr, "breccia_bench: error: %s\n", e.what());
+    return static_cast<int>(breccia::ExitCode::kNumerics);
   }
-  return 0;
 }

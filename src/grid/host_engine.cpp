@@ -106,8 +106,8 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments) {
     }
     for (const std::vector<TilePlane>& planes : planes_of_colour_) {
 #pragma omp for schedule(dynamic, 1)
-      for (std::size_t n = 0; n < planes.size(); ++n) {
-        for (std::uint32_t t = planes[n].first; t < planes[n].last; ++t) kernels_.pass(arguments, t, reports[t]);
+      for (const TilePlane& plane : planes) {
+        for (std::uint32_t t = plane.first; t < plane.last; ++t) kernels_.pass(arguments, t, reports[t]);
       }
     }
   }

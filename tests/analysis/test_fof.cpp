@@ -94,7 +94,11 @@ TEST(FriendsOfFriends, DistributionDoesNotChangeALabel) {
 // The news of the smallest id has to pass through every rank again and again.
 TEST(FriendsOfFriends, ChainWindsThroughAllRanks) {
   std::vector<Vec3d> chain;
-  for (int k = 0; k < 400; ++k) chain.push_back({0.9 * kLink * (k % 20), 0.0, 2.5 * kLink * (k / 20)});
+  for (int k = 0; k < 400; ++k) {
+    const int column = k % 20;
+    const int row = k / 20;
+    chain.push_back({0.9 * kLink * column, 0.0, 2.5 * kLink * row});
+  }
   for (int k = 0; k < 19; ++k) {
     const double x = k % 2 == 0 ? 0.9 * kLink * 19 : 0.0;  // bridges at alternating ends
     chain.push_back({x, 0.0, 2.5 * kLink * k + 0.8 * kLink});
@@ -148,7 +152,8 @@ TEST(FriendsOfFriends, IsolatedParticlesAreCheap) {
   // A lattice of 1.1 links over 4e5 m: no friends, but neighbouring cells all around.
   std::vector<Vec3d> points;
   for (int k = 0; k < 100000; ++k) {
-    points.push_back({1.1 * kLink * (k % 50), 1.1 * kLink * (k / 50 % 50), 1.1 * kLink * (k / 2500)});
+    const int node[3] = {k % 50, k / 50 % 50, k / 2500};
+    points.push_back({1.1 * kLink * node[0], 1.1 * kLink * node[1], 1.1 * kLink * node[2]});
   }
   const Grouped result = group(points, kLink, [](std::size_t i) { return i < 50000 ? 0 : mpi::Comm().size() - 1; });
   for (std::size_t i = 0; i < points.size(); ++i) ASSERT_EQ(result.label[i], i);

@@ -47,7 +47,7 @@ Error error_of(Call&& call) {
     return error;
   }
   ADD_FAILURE() << "no error was thrown";
-  return Error(ExitCode::kDone, "");
+  return {ExitCode::kDone, ""};
 }
 
 void expect_same_error_everywhere(const Error& error, ExitCode code, const std::string& part, const mpi::Comm& comm) {

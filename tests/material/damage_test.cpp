@@ -15,7 +15,6 @@ namespace {
 
 using namespace breccia::material;
 using namespace breccia::test;
-using breccia::DamageParameters;
 using breccia::MaterialParameters;
 
 // Particle of the paper's run: 47324 in a sphere of 50 km.

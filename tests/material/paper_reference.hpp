@@ -31,7 +31,8 @@ class PaperParticle {
     if (result.kirchhoff_pressure < 0.0) result.kirchhoff_pressure *= 1.0 - damage_;
 
     const Eigen::JacobiSVD<Eigen::Matrix3d> svd(elastic_, Eigen::ComputeFullU | Eigen::ComputeFullV);
-    const Eigen::Matrix3d u = svd.matrixU(), v = svd.matrixV();
+    const Eigen::Matrix3d& u = svd.matrixU();
+    const Eigen::Matrix3d& v = svd.matrixV();
     const Eigen::Vector3d trial = svd.singularValues().array().log();
     const Eigen::Vector3d returned = return_map(trial, result.kirchhoff_pressure);
     elastic_ = u * returned.array().exp().matrix().asDiagonal() * v.transpose();

@@ -70,7 +70,7 @@ TEST(Bodies, SharesAreContiguousEvenAndIndependentOfRanks) {
   const ParticleArrays whole = make_particles(scene, mpi::Comm(MPI_COMM_SELF));
   const std::uint64_t first = comm.exclusive_scan(mine.size());
   const auto ranks = static_cast<std::uint64_t>(comm.size());
-  EXPECT_NEAR(static_cast<double>(mine.size()), static_cast<double>(whole.size() / ranks), 1.0);
+  EXPECT_NEAR(static_cast<double>(mine.size()), static_cast<double>(whole.size()) / static_cast<double>(ranks), 1.0);
   for (std::size_t i = 0; i < mine.size(); ++i) {
     ASSERT_EQ(mine.id[i], first + i);
     ASSERT_EQ(whole.id[first + i], first + i);
