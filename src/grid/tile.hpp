@@ -23,8 +23,8 @@ constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTil
 inline constexpr int kNodeBias = 8;  ///< keeps the 8-bit tile coordinates positive
 inline constexpr std::uint32_t kNoBlock = 0xffffffffU;
 
-/// Which rows along z of a block hold something: bit 4 x + y of half 0 for x = 0, 1, and 4 (x - 2) + y of half 1. Tiles on
-/// both sides of a block may mark it at the same time, each its own half.
+/// Which rows along z of a block hold something: bit 4 x + y of half 0 for x = 0, 1, and 4 (x - 2) + y of half 1. Tiles
+/// on both sides of a block may mark it at the same time, each its own half.
 struct RowMask {
   std::uint8_t half[2] = {0, 0};
 };
