@@ -71,7 +71,8 @@ class Engine {
   virtual void update_grid(double kick) = 0;
   /// G2P and particle update over `step`.
   virtual void gather(double step) = 0;
-  /// gather(step) and the next scatter(step / 2) in one sweep.
+  /// gather(step) and the next scatter(step / 2) in one sweep. update_grid(step), with the same step, must follow: it
+  /// finds much of its work done while the nodes were in the cache.
   virtual void gather_scatter(double step) = 0;
 
   /// Positions x + time * v [m] and masses [kg] of this rank's particles, in the order held_gravity expects.

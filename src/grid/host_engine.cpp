@@ -3,8 +3,7 @@
 #include <pmmintrin.h>
 #include <xmmintrin.h>
 
-#include <algorithm>
-#include <string>
+#include <stdexcept>
 
 #include "breccia/error.hpp"
 
@@ -92,37 +91,6 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
 }
 
 template <class P>
-void HostEngine<P>::run_pass(const PassArguments<P>& arguments) {
-  constexpr std::uint32_t kChunk = 16;
-  const auto lone_packs = static_cast<std::uint32_t>(lone_pull_.size());
-  std::vector<TileReport> reports(tiles_.size());
-  std::vector<TileReport> lone_reports((lone_packs + kChunk - 1) / kChunk);
-#pragma omp parallel num_threads(setup_.threads)
-  {
-#pragma omp for schedule(static) nowait
-    for (std::size_t n = 0; n < lone_reports.size(); ++n) {
-      const auto first = static_cast<std::uint32_t>(n) * kChunk;
-      kernels_.lone_pass(arguments, first, std::min(first + kChunk, lone_packs), lone_reports[n]);
-    }
-    for (const std::vector<TilePlane>& planes : planes_of_colour_) {
-#pragma omp for schedule(dynamic, 1)
-      for (const TilePlane& plane : planes) {
-        for (std::uint32_t t = plane.first; t < plane.last; ++t) kernels_.pass(arguments, t, reports[t]);
-      }
-    }
-  }
-  report_ = {};
-  const auto book = [&](const TileReport& r) {
-    report_.plastic_work += r.plastic_work;
-    report_.viscous_work += r.viscous_work;
-    report_.largest_move = std::max(report_.largest_move, r.largest_move);
-    strayed_packs_ += r.strayed;
-  };
-  std::for_each(reports.begin(), reports.end(), book);
-  std::for_each(lone_reports.begin(), lone_reports.end(), book);
-}
-
-template <class P>
 void HostEngine<P>::scatter(double half_step) {
   PassArguments<P> a = pass_arguments(0.0, half_step);
   a.gather = false;
@@ -138,24 +106,36 @@ void HostEngine<P>::gather(double step) {
 
 template <class P>
 void HostEngine<P>::gather_scatter(double step) {
-  run_pass(pass_arguments(step, 0.5 * step));
+  const NodeArguments<P> nodes = node_arguments(step);
+  run_pass(pass_arguments(step, 0.5 * step), &nodes);
+  trailing_kick_ = step;
 }
 
 template <class P>
-void HostEngine<P>::update_grid(double kick) {
-  kick_ = kick;
-  halo_.add_to_owners(sums_.data(), comm_);
-  for (const std::uint32_t block : shared_blocks_) rows_[block] = kAllRows;
+NodeArguments<P> HostEngine<P>::node_arguments(double kick) {
   NodeArguments<P> a;
   a.sums = sums_.data();
   a.velocities = velocities_.data();
   a.rows = rows_.data();
   a.kick = static_cast<Real>(kick);
   a.smallest_mass = static_cast<Real>(1e-30 * smallest_mass_);
+  return a;
+}
+
+template <class P>
+void HostEngine<P>::update_grid(double kick) {
+  if (trailing_kick_ != 0.0 && trailing_kick_ != kick) {
+    throw std::logic_error("gather_scatter(step) must be followed by update_grid(step)");
+  }
+  trailing_kick_ = 0.0;
+  kick_ = kick;
+  halo_.add_to_owners(sums_.data(), comm_);
+  for (const std::uint32_t block : shared_blocks_) rows_[block] = kAllRows;
+  const NodeArguments<P> a = node_arguments(kick);
   const auto blocks = static_cast<std::uint32_t>(owned_blocks_);
-  constexpr std::uint32_t chunk = 16;
+  constexpr std::uint32_t kChunk = 64;
 #pragma omp parallel for schedule(static) num_threads(setup_.threads)
-  for (std::uint32_t b = 0; b < blocks; b += chunk) kernels_.update_blocks(a, b, std::min(b + chunk, blocks));
+  for (std::uint32_t b = 0; b < blocks; b += kChunk) kernels_.update_blocks(a, b, std::min(b + kChunk, blocks));
   boundaries_.apply(velocities_.data());
   halo_.share_from_owners(velocities_.data(), comm_);
 }

@@ -1,5 +1,5 @@
-// The engine on host cores: threads over planes of tiles, even planes before odd ones, so that no node is written twice
-// at once and sums are the same for any number of threads.
+// The engine on host cores: threads over planes of tiles, each even plane before its odd neighbours, so that no node is
+// written twice at once and sums are the same for any number of threads.
 #pragma once
 
 #include "grid/blocks.hpp"
@@ -23,10 +23,15 @@ struct SortedPlacements {
   std::vector<Placement> lone;
 };
 
-/// Consecutive tiles whose blocks lie in one plane normal to x.
-struct TilePlane {
+/// A step of a sweep: pass over the tiles first .. last-1, or update the grid in their blocks.
+struct SweepStep {
   std::uint32_t first, last;
+  bool update;
 };
+/// Steps that one thread does in this order.
+using SweepTask = std::vector<SweepStep>;
+/// Tasks that may run at once.
+using SweepPhase = std::vector<SweepTask>;
 
 template <class P>
 class HostEngine final : public Engine {
@@ -57,9 +62,12 @@ class HostEngine final : public Engine {
   static constexpr std::size_t kLanes = P::kLanes;
   static constexpr std::uint32_t packs_for(std::uint32_t particles) { return (particles + P::kLanes - 1) / P::kLanes; }
 
-  // Passes (host_engine.cpp).
+  // Passes (host_engine.cpp, host_engine_sweep.cpp).
   PassArguments<P> pass_arguments(double step, double half_step);
-  void run_pass(const PassArguments<P>& arguments);
+  NodeArguments<P> node_arguments(double kick);
+  void run_pass(const PassArguments<P>& arguments, const NodeArguments<P>* trailing = nullptr);
+  void run_task(const SweepTask& task, const PassArguments<P>& arguments, const NodeArguments<P>* trailing,
+                std::vector<TileReport>& reports) const;
 
   // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp).
   void settle(std::vector<Placement> placements);
@@ -73,7 +81,7 @@ class HostEngine final : public Engine {
   void arrange(const SortedPlacements& placements);
   void connect_tiles();
   void connect_halo();
-  void colour_planes();
+  void plan_sweep();
   void compact_flaws();
   [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
 
@@ -104,7 +112,7 @@ class HostEngine final : public Engine {
   std::vector<float> flaw_thresholds_;
   std::vector<Tile> tiles_;
   std::vector<TileBox> boxes_;
-  std::vector<std::vector<TilePlane>> planes_of_colour_;
+  std::vector<SweepPhase> sweep_;
   LonePacks lone_;
   std::vector<BlockCoord> lone_block_;
   std::vector<std::int32_t> lone_node_;  // packed node at the last sorting
@@ -115,6 +123,8 @@ class HostEngine final : public Engine {
   std::vector<Real> velocities_;
   std::vector<RowMask> rows_;
   std::vector<std::uint32_t> shared_blocks_;  // owned blocks that other ranks add to
+  std::vector<char> is_shared_;               // the same, by block
+  double trailing_kick_ = 0.0;                // of the rows already updated by the last pass; 0: none
   std::size_t owned_blocks_ = 0;
   double smallest_mass_ = 0.0;
   std::uint64_t strayed_packs_ = 0;  // seen since the last sorting; reported there, on all ranks at once

@@ -128,24 +128,9 @@ void HostEngine<P>::connect_halo() {
   for (const std::vector<Request>& of_rank : asked) {
     for (const Request& request : of_rank) shared_blocks_.push_back(blocks_.find(request.key));
   }
+  is_shared_.assign(blocks_.size(), 0);
+  for (const std::uint32_t block : shared_blocks_) is_shared_[block] = 1;
   halo_.set(std::move(touched), nodes_of(asked));
-}
-
-template <class P>
-void HostEngine<P>::colour_planes() {
-  // Tiles are sorted by x first, so a plane of blocks is a run of tiles, and inside it consecutive tiles share most of
-  // their nodes while these are warm. Planes two apart share no node. On a periodic axis with an odd number of blocks
-  // the last plane gets a colour of its own, since it is next to the first.
-  const std::int32_t period = periodicity_.blocks[0];
-  planes_of_colour_.assign(3, {});
-  for (std::uint32_t first = 0; first < tiles_.size();) {
-    const std::int32_t x = block_coord(blocks_.keys()[first]).x;
-    std::uint32_t last = first + 1;
-    while (last < tiles_.size() && block_coord(blocks_.keys()[last]).x == x) ++last;
-    const bool odd_one_out = period % 2 == 1 && x == period - 1;
-    planes_of_colour_[odd_one_out ? 2U : static_cast<std::uint32_t>(x & 1)].push_back({first, last});
-    first = last;
-  }
 }
 
 template class HostEngine<MixedPrecision>;

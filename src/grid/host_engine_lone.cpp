@@ -81,9 +81,7 @@ bool HostEngine<P>::lone_strayed() const {
   return false;
 }
 
-template bool HostEngine<MixedPrecision>::lone_strayed() const;
-template bool HostEngine<DoublePrecision>::lone_strayed() const;
-template SortedPlacements HostEngine<MixedPrecision>::separate(std::vector<Placement>);
-template SortedPlacements HostEngine<DoublePrecision>::separate(std::vector<Placement>);
+template class HostEngine<MixedPrecision>;
+template class HostEngine<DoublePrecision>;
 
 }  // namespace breccia::grid

@@ -76,7 +76,7 @@ void HostEngine<P>::settle(std::vector<Placement> placements) {
   arrange(separate(std::move(placements)));
   connect_tiles();
   connect_halo();
-  colour_planes();
+  plan_sweep();
 }
 
 template <class P>
