@@ -232,22 +232,24 @@ BRECCIA_HD PackMask<I, W> operator!(PackMask<I, W> a) {
 namespace detail {
 // g++ 12 makes a tree of shuffles of a plain loop over the lanes.
 template <class V>
-BRECCIA_HD bool any_bit(V mask) {
-  if constexpr (sizeof(V) == 64) {
-#if defined(__AVX512F__)
-    return _mm512_test_epi32_mask(__builtin_bit_cast(__m512i, mask), __builtin_bit_cast(__m512i, mask)) != 0;
-#endif
-  } else if constexpr (sizeof(V) == 32) {
-#if defined(__AVX2__)
-    return _mm256_movemask_epi8(__builtin_bit_cast(__m256i, mask)) != 0;
-#endif
-  } else {
-    static_assert(sizeof(V) <= 16);
-    std::uint64_t bits[2] = {0, 0};
-    std::memcpy(bits, &mask, sizeof(V));
-    return (bits[0] | bits[1]) != 0;
-  }
+requires(sizeof(V) <= 16) BRECCIA_HD bool any_bit(V mask) {
+  std::uint64_t bits[2] = {0, 0};
+  std::memcpy(bits, &mask, sizeof(V));
+  return (bits[0] | bits[1]) != 0;
 }
+#if defined(__AVX2__)
+template <class V>
+requires(sizeof(V) == 32) BRECCIA_HD bool any_bit(V mask) {
+  return _mm256_movemask_epi8(__builtin_bit_cast(__m256i, mask)) != 0;
+}
+#endif
+#if defined(__AVX512F__)
+template <class V>
+requires(sizeof(V) == 64) BRECCIA_HD bool any_bit(V mask) {
+  const __m512i bits = __builtin_bit_cast(__m512i, mask);
+  return _mm512_test_epi32_mask(bits, bits) != 0;
+}
+#endif
 }  // namespace detail
 
 /// True where any lane is set.
