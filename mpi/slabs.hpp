@@ -3,6 +3,7 @@
 
 #include <cstdint>
 #include <map>
+#include <utility>
 #include <vector>
 
 #include "mpi/comm.hpp"
@@ -16,6 +17,8 @@ class Slabs {
  public:
   /// One slab on one rank: owns every plane.
   Slabs() = default;
+  /// Slabs as axis() and cuts() of others say.
+  Slabs(int axis, std::vector<std::int32_t> cuts) : axis_(axis), cuts_(std::move(cuts)) {}
   /// Cuts the planes so that the work is as even as whole planes allow. Collective; `mine` is this rank's share.
   static Slabs balanced(int axis, const PlaneWork& mine, const Comm& comm);
 

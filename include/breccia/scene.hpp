@@ -97,11 +97,14 @@ struct TimeParameters {
 };
 
 struct OutputParameters {
-  double snapshot_interval = 0.0;      ///< [s]; 0: only start and end
-  double diagnostics_interval = 0.0;   ///< [s]; 0: end/200
-  std::vector<std::string> fields;     ///< snapshot fields; empty: all there are
-  std::vector<double> analysis_times;  ///< times of an in-situ analysis besides the end [s]
-  double link_cells = 3.0;             ///< friends-of-friends length [cells]
+  double snapshot_interval = 0.0;                 ///< [s]; 0: only start and end
+  double diagnostics_interval = 0.0;              ///< [s]; 0: end/200
+  std::vector<std::string> fields;                ///< snapshot fields; empty: all there are
+  std::vector<double> analysis_times;             ///< times of an in-situ analysis besides the end [s]
+  std::optional<double> checkpoint_wall = 600.0;  ///< wall time between checkpoints [s]; none: not by wall time
+  double checkpoint_time = 0.0;                   ///< simulated time between checkpoints [s]; 0: not by simulated time
+  std::uint64_t keep = 2;                         ///< newest checkpoints that stay
+  double link_cells = 3.0;                        ///< friends-of-friends length [cells]
 };
 
 /// Everything a run needs to know.

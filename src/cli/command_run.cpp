@@ -1,6 +1,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <regex>
 #include <string>
 
 #include "breccia/error.hpp"
@@ -19,6 +20,8 @@ struct Options {
   std::optional<std::uint64_t> steps;
   std::string device = "auto";
   int threads = 1;
+  std::string restart;
+  std::string walltime;
   bool profile = false;
 };
 
@@ -28,6 +31,17 @@ double parse_until(const std::string& text) {
   } catch (const UsageError& error) {
     throw UsageError("--until: " + std::string(error.what()));
   }
+}
+
+// "hh:mm:ss", also "mm:ss" or "ss" [s].
+double parse_walltime(const std::string& text) {
+  static const std::regex kForm("(?:(?:(\\d+):)?(\\d+):)?(\\d+)");
+  std::smatch parts;
+  if (!std::regex_match(text, parts, kForm)) {
+    throw UsageError("--walltime: \"" + text + "\" is no time; write hours, minutes and seconds: 12:00:00");
+  }
+  const auto number = [&](std::size_t i) { return parts[i].matched ? std::stod(parts[i].str()) : 0.0; };
+  return 3600.0 * number(1) + 60.0 * number(2) + number(3);
 }
 
 void check_device(const std::string& device) {
@@ -42,6 +56,8 @@ void run(const Options& options, const mpi::Comm& comm) {
   run_options.out = options.out;
   if (!options.until.empty()) run_options.until = parse_until(options.until);
   run_options.steps = options.steps;
+  run_options.restart = options.restart;
+  if (!options.walltime.empty()) run_options.walltime = parse_walltime(options.walltime);
   run_options.threads = options.threads;
   run_options.profile = options.profile;
   scene::LoadedScene loaded = load(options.scene, comm);
@@ -56,6 +72,15 @@ void add_run(CLI::App& app, Action& action) {
   const auto options = std::make_shared<Options>();
   add_scene_options(command, options->scene);
   command.add_option("--out", options->out, "Output folder, new or empty [out/<scene name>]")->type_name("DIR");
+  command
+      .add_option("--restart", options->restart,
+                  "Continue from the newest checkpoint in the output folder (auto; a new run if there is none) or from "
+                  "this file")
+      ->type_name("auto|FILE");
+  command
+      .add_option("--walltime", options->walltime,
+                  "Write a checkpoint and end with exit code 75 before this much wall time is over")
+      ->type_name("hh:mm:ss");
   command.add_option("--until", options->until, "End at this simulated time instead, e.g. \"2000 s\"")
       ->type_name("TIME");
   command.add_option("--steps", options->steps, "End after this many steps")

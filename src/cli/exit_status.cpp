@@ -43,7 +43,9 @@ void print_error(const Outcome& outcome, int rank) {
   std::replace(line.begin(), line.end(), '\n', ' ');
   const std::string where = rank == 0 ? "" : fmt::format("rank {}: ", rank);
   std::fflush(stdout);
-  fmt::print(stderr, "breccia: error: {}{}\n", where, line);
+  // To stop when told so is no error.
+  const char* const kind = outcome.code == static_cast<int>(ExitCode::kStopped) ? "" : "error: ";
+  fmt::print(stderr, "breccia: {}{}{}\n", kind, where, line);
 }
 
 /// True once `request` is complete; false if that takes longer than kPatience.

@@ -14,7 +14,7 @@ void run_command_line(int argc, char** argv, const mpi::Comm& comm) {
   app.require_subcommand(0, 1);
   app.footer(
       "`breccia COMMAND --help` explains one command. Exit codes: 0 done, 2 wrong use or scene,\n"
-      "3 the numbers went wrong, 4 input or output.");
+      "3 the numbers went wrong, 4 input or output, 75 stopped early, to be continued with --restart auto.");
 
   Action action;
   add_run(app, action);

@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "breccia/engine_state.hpp"
 #include "breccia/particle_arrays.hpp"
 #include "breccia/scene.hpp"
 #include "material/effects_policy.hpp"
@@ -60,6 +61,12 @@ class Engine {
   /// `spin` gives the initial velocity gradient of each body. Collective.
   virtual void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
                       std::span<const Vec3d> spin_of_body) = 0;
+
+  /// The whole state, only between sort() and the scatter() that follows.
+  [[nodiscard]] virtual EngineState save() const = 0;
+  /// Takes a saved state in place of insert(): a scatter() that follows gives the same bits as after save(), if the
+  /// state comes from as many ranks. Collective. Throws IoError if a field is missing.
+  virtual void restore(const EngineState& state) = 0;
 
   /// Sorts particles into tiles, sends those that left the slab to their owner, rebuilds blocks and halo. Only between
   /// gather() and scatter(). Collective.

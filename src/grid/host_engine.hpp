@@ -42,6 +42,8 @@ class HostEngine final : public Engine {
 
   void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
               std::span<const Vec3d> spin_of_body) override;
+  [[nodiscard]] EngineState save() const override;
+  void restore(const EngineState& state) override;
   void sort() override;
   void scatter(double half_step) override;
   void update_grid(double kick) override;
@@ -71,6 +73,7 @@ class HostEngine final : public Engine {
 
   // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp).
   void settle(std::vector<Placement> placements);
+  void settle_in_slabs(std::vector<Placement> placements);
   [[nodiscard]] bool unbalanced(std::size_t particles) const;
   void choose_slabs(std::span<const Placement> placements);
   [[nodiscard]] int longest_axis(std::span<const Placement> placements) const;
@@ -83,6 +86,12 @@ class HostEngine final : public Engine {
   void connect_halo();
   void plan_sweep();
   void compact_flaws();
+  void switch_damage_off();
+
+  // Of a checkpoint (host_engine_checkpoint.cpp).
+  void save_flaws(std::span<const Placement> placements, EngineState& state) const;
+  void restore_flaws(const EngineState& state);
+
   [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
 
   // Calls visit(slot, block) for every particle, in storage order; its node is relative to the block.

@@ -72,6 +72,11 @@ void HostEngine<P>::sort() {
 template <class P>
 void HostEngine<P>::settle(std::vector<Placement> placements) {
   if (!slabs_chosen_ || unbalanced(placements.size())) choose_slabs(placements);
+  settle_in_slabs(std::move(placements));
+}
+
+template <class P>
+void HostEngine<P>::settle_in_slabs(std::vector<Placement> placements) {
   migrate(placements);
   arrange(separate(std::move(placements)));
   connect_tiles();
@@ -251,11 +256,16 @@ bool HostEngine<P>::finish_damage() {
     all_broken = all_broken && store_.damage_level[slot / kLanes].root[static_cast<int>(slot % kLanes)] >= Real(1);
   });
   if (comm_.any(!all_broken)) return false;
+  switch_damage_off();
+  return true;
+}
+
+template <class P>
+void HostEngine<P>::switch_damage_off() {
   setup_.effects.damage = false;
   setup_.effects.fully_damaged = true;
   store_.drop_damage();
   flaw_thresholds_ = {};
-  return true;
 }
 
 template class HostEngine<MixedPrecision>;

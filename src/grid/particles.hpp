@@ -121,6 +121,7 @@ class ParticleStore {
   [[nodiscard]] bool has(Group group) const;
   /// Start of a group's array and the bytes from pack to pack.
   [[nodiscard]] std::byte* data(Group group);
+  [[nodiscard]] const std::byte* data(Group group) const { return const_cast<ParticleStore*>(this)->data(group); }
   [[nodiscard]] static std::size_t stride(Group group);
   /// Bytes of all fields of one particle.
   [[nodiscard]] static std::size_t bytes_per_particle(const GroupSet& groups);

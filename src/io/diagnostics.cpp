@@ -4,10 +4,14 @@
 
 #include <array>
 #include <cerrno>
+#include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <string>
 
 #include "breccia/error.hpp"
 #include "io/collectively.hpp"
+#include "io/durable_file.hpp"
 
 namespace breccia::io {
 
@@ -66,6 +70,20 @@ std::string line_of(const DiagnosticsRow& row) {
   return line;
 }
 
+// Header and rows of the steps before `first_step`. A line that the end of a run cut off is none.
+std::string rows_before(const std::filesystem::path& path, std::uint64_t first_step) {
+  std::string kept = header_line() + '\n';
+  std::ifstream file(path);
+  std::string line;
+  std::getline(file, line);
+  while (std::getline(file, line) && !file.eof()) {
+    const std::size_t comma = line.find(',');
+    if (comma == std::string::npos) continue;
+    if (std::strtoull(line.c_str() + comma + 1, nullptr, 10) < first_step) kept += line + '\n';
+  }
+  return kept;
+}
+
 }  // namespace
 
 std::span<const DiagnosticsColumn> diagnostics_columns() { return kColumns; }
@@ -85,6 +103,15 @@ DiagnosticsWriter::DiagnosticsWriter(const std::filesystem::path& path, const mp
     file_.reset(std::fopen(path_.c_str(), "w"));
     if (!file_) throw IoError(fmt::format("{}: cannot create: {}", path_.string(), std::strerror(errno)));
     put(header_line());
+  });
+}
+
+DiagnosticsWriter::DiagnosticsWriter(const std::filesystem::path& path, std::uint64_t first_step, const mpi::Comm& comm)
+    : path_(path), comm_(comm) {
+  on_root(comm_, [&] {
+    write_file(path_, rows_before(path_, first_step));
+    file_.reset(std::fopen(path_.c_str(), "a"));
+    if (!file_) throw IoError(fmt::format("{}: cannot open: {}", path_.string(), std::strerror(errno)));
   });
 }
 

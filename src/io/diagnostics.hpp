@@ -60,6 +60,9 @@ class DiagnosticsWriter {
   /// Starts a new file with the line of column names and units. Collective.
   /// Throws IoError, the same on all ranks.
   DiagnosticsWriter(const std::filesystem::path& path, const mpi::Comm& comm);
+  /// Continues the file with rows from `first_step` on; what it holds from there is dropped. A new file if there is
+  /// none. Collective. Throws IoError, the same on all ranks.
+  DiagnosticsWriter(const std::filesystem::path& path, std::uint64_t first_step, const mpi::Comm& comm);
 
   /// Adds a line, every double with the 17 digits that give it back exactly, and hands it to the operating system.
   /// The root's `row` counts. Collective. Throws IoError (disk full), the same on all ranks.

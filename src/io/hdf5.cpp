@@ -145,6 +145,16 @@ std::vector<std::uint64_t> File::shape(const std::string& dataset) const {
   return extents;
 }
 
+std::size_t File::element_bytes(const std::string& dataset) const {
+  std::size_t bytes = 0;
+  stage(dataset, "open", [&] {
+    const Handle set = checked(H5Dopen2(file_.get(), dataset.c_str(), H5P_DEFAULT), H5Dclose);
+    const Handle type = checked(H5Dget_type(set.get()), H5Tclose);
+    bytes = H5Tget_size(type.get());
+  });
+  return bytes;
+}
+
 void File::create_group(const std::string& group) {
   stage(group, "create the group",
         [&] { checked(H5Gcreate2(file_.get(), group.c_str(), H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT), H5Gclose); });

@@ -84,6 +84,8 @@ class File {
   [[nodiscard]] bool exists(const std::string& object) const;
   /// Extents of a dataset.
   [[nodiscard]] std::vector<std::uint64_t> shape(const std::string& dataset) const;
+  /// Bytes of an element of a dataset.
+  [[nodiscard]] std::size_t element_bytes(const std::string& dataset) const;
   void create_group(const std::string& group);
   /// A second name of an object (hard link).
   void link(const std::string& object, const std::string& name);

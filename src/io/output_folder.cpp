@@ -14,6 +14,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
+void create(const fs::path& folder) {
+  std::error_code error;
+  fs::create_directories(folder, error);
+  if (error) throw IoError(fmt::format("output folder {}: cannot be created: {}", folder.string(), error.message()));
+}
+
 void require_empty(const fs::path& folder) {
   std::error_code error;
   const fs::directory_iterator entry(folder, error);
@@ -33,10 +39,16 @@ void require_writable(const fs::path& folder) {
 
 void prepare_output_folder(const fs::path& folder, const mpi::Comm& comm) {
   on_root(comm, [&] {
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error) throw IoError(fmt::format("output folder {}: cannot be created: {}", folder.string(), error.message()));
+    create(folder);
     require_empty(folder);
+    require_writable(folder);
+  });
+}
+
+void continue_output_folder(const fs::path& folder, const mpi::Comm& comm) {
+  on_root(comm, [&] {
+    create(folder);
+    if (!fs::exists(folder / "diagnostics.csv")) require_empty(folder);
     require_writable(folder);
   });
 }

@@ -12,4 +12,7 @@ namespace breccia::io {
 /// created or written to; the same on all ranks.
 void prepare_output_folder(const std::filesystem::path& folder, const mpi::Comm& comm);
 
+/// The same for a run that goes on: the folder may hold what a run left there, which is known by its diagnostics.csv.
+void continue_output_folder(const std::filesystem::path& folder, const mpi::Comm& comm);
+
 }  // namespace breccia::io

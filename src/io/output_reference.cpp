@@ -33,9 +33,16 @@ One line per output step. The first line names the columns with their units; num
 double precision value back exactly.
 
 {diagnostics}
+## `chk_NNNN.h5`
+
+A checkpoint: everything a run needs to go on, bit for bit, in parallel HDF5 with a CRC-32 of the whole file behind its end.
+`/Particles` has the fields of the engine by their bits, in storage order; `/FlawThresholds` the strains at which flaws
+begin to grow, particle after particle; `/Engine` the slabs and the particles of each rank; `/Run` the rest as JSON. The
+newest `output.keep` stay. They are read by the version that wrote them, on any number of ranks; for results take snapshots.
+
 ## `summary.json`
 
-Written at the end: `particles`, `steps`, `simulated_time` [s], `wall_seconds`, `ranks`, `threads`, `device`, `precision`,
+Written at the end: `particles`, `steps`, `simulated_time` [s], `time_step` (the last) [s], `wall_seconds`, `ranks`, `threads`, `device`, `precision`,
 `particle_steps_per_second`; `conservation` with the drifts of `mass` (over the total mass), `momentum` (over sum m |v|),
 `angular_momentum` (over sum m |x cross v|) and `energy` (over max(kinetic + |potential|)); `damaged_fraction`; `remnants`,
 largest first; `stages` with the wall time of each stage of the step; `versions`; `machine`; `scene`, every key as resolved;

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cstdlib>
 #include <fstream>
 #include <nlohmann/json.hpp>
 #include <vector>
@@ -36,6 +37,13 @@ std::vector<Entry> read_entries(const std::filesystem::path& path) {
   return entries;
 }
 
+void write_entries(const std::filesystem::path& path, std::vector<Entry> entries) {
+  std::ranges::stable_sort(entries, {}, &Entry::time);
+  nlohmann::ordered_json series{{"file-series-version", "1.0"}, {"files", nlohmann::ordered_json::array()}};
+  for (const Entry& entry : entries) series["files"].push_back({{"name", entry.name}, {"time", entry.time}});
+  write_file(path, series.dump(1) + "\n");
+}
+
 }  // namespace
 
 std::string snapshot_name(std::uint64_t number) { return fmt::format("snap_{:04}.hdf", number); }
@@ -46,10 +54,20 @@ void add_to_series(const std::filesystem::path& folder, const std::string& name,
     std::vector<Entry> entries = read_entries(path);
     std::erase_if(entries, [&](const Entry& entry) { return entry.name == name; });
     entries.push_back({name, time});
-    std::ranges::stable_sort(entries, {}, &Entry::time);
-    nlohmann::ordered_json series{{"file-series-version", "1.0"}, {"files", nlohmann::ordered_json::array()}};
-    for (const Entry& entry : entries) series["files"].push_back({{"name", entry.name}, {"time", entry.time}});
-    write_file(path, series.dump(1) + "\n");
+    write_entries(path, entries);
+  });
+}
+
+void cut_series(const std::filesystem::path& folder, std::uint64_t first_number, const mpi::Comm& comm) {
+  on_root(comm, [&] {
+    const std::filesystem::path path = folder / "run.hdf.series";
+    std::vector<Entry> entries = read_entries(path);
+    const std::size_t before = entries.size();
+    std::erase_if(entries, [&](const Entry& entry) {
+      return std::ranges::find(entry.name, '_') != entry.name.end() &&
+             std::strtoull(entry.name.c_str() + entry.name.find('_') + 1, nullptr, 10) >= first_number;
+    });
+    if (entries.size() != before) write_entries(path, entries);
   });
 }
 

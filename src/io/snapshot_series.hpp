@@ -16,4 +16,7 @@ std::string snapshot_name(std::uint64_t number);
 /// the other entries stay. The file is replaced in one go. Collective. Throws IoError, the same on all ranks.
 void add_to_series(const std::filesystem::path& folder, const std::string& name, double time, const mpi::Comm& comm);
 
+/// Takes snapshots with this and later numbers off the list. Collective; throws IoError as add_to_series does.
+void cut_series(const std::filesystem::path& folder, std::uint64_t first_number, const mpi::Comm& comm);
+
 }  // namespace breccia::io

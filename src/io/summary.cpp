@@ -66,6 +66,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["particles"] = summary.particles;
   json["steps"] = summary.steps;
   json["simulated_time"] = summary.simulated_time;
+  json["time_step"] = summary.time_step;
   json["wall_seconds"] = summary.wall_seconds;
   json["ranks"] = summary.ranks;
   json["threads"] = summary.threads;

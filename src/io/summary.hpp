@@ -32,6 +32,7 @@ struct RunSummary {
   std::uint64_t particles = 0;
   std::uint64_t steps = 0;
   double simulated_time = 0.0;  ///< [s]
+  double time_step = 0.0;       ///< the last one [s]
   double wall_seconds = 0.0;    ///< of the time steps, without start and output
   int ranks = 1;
   int threads = 1;              ///< of each rank

@@ -102,14 +102,14 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
   row.active_blocks = static_cast<std::uint64_t>(s[kBlocks]);
   row.particles_per_rank_min = comm_.min(static_cast<std::uint64_t>(p.size()));
   row.particles_per_rank_max = comm_.max(static_cast<std::uint64_t>(p.size()));
-  if (!started_) {
-    first_ = row;
-    started_ = true;
+  if (!state_.started) {
+    state_.first = row;
+    state_.started = true;
   }
   const auto total = [](const io::DiagnosticsRow& r) {
     return r.kinetic_energy + r.internal_energy + r.gravitational_energy;
   };
-  row.energy_residual = total(row) - total(first_);
+  row.energy_residual = total(row) - total(state_.first);
   check(row);
   follow(row, s[kMomentumScale], s[kAngularScale]);
   return row;
@@ -119,11 +119,11 @@ void Budget::check(const io::DiagnosticsRow& row) const {
   if (!std::isfinite(row.kinetic_energy + row.internal_energy + row.elastic_energy + row.min_J + row.max_J)) {
     throw NumericsError("a particle is not finite any more: the run is unstable; try a smaller time.step or time.cfl");
   }
-  if (row.particles != first_.particles) {
-    throw NumericsError(fmt::format("{} particles, but {} at the start", row.particles, first_.particles));
+  if (row.particles != state_.first.particles) {
+    throw NumericsError(fmt::format("{} particles, but {} at the start", row.particles, state_.first.particles));
   }
-  if (std::abs(row.mass - first_.mass) > 1e-12 * first_.mass) {
-    throw NumericsError(fmt::format("total mass {:.17g} kg, but {:.17g} kg at the start", row.mass, first_.mass));
+  if (std::abs(row.mass - state_.first.mass) > 1e-12 * state_.first.mass) {
+    throw NumericsError(fmt::format("total mass {:.17g} kg, but {:.17g} kg at the start", row.mass, state_.first.mass));
   }
 }
 
@@ -132,19 +132,20 @@ void Budget::follow(const io::DiagnosticsRow& row, double momentum_scale, double
     if (scale > 0.0) drift = std::max(drift, change / scale);
   };
   // Scales are the largest so far: bodies that come to rest must not make an old drift look larger.
-  momentum_scale_ = std::max(momentum_scale_, momentum_scale);
-  angular_scale_ = std::max(angular_scale_, angular_scale);
-  energy_scale_ = std::max(energy_scale_, row.kinetic_energy + std::abs(row.gravitational_energy));
-  grow(drift_.mass, std::abs(row.mass - first_.mass), first_.mass);
-  grow(drift_.momentum,
-       length({row.momentum_x - first_.momentum_x, row.momentum_y - first_.momentum_y,
-               row.momentum_z - first_.momentum_z}),
-       momentum_scale_);
-  grow(drift_.angular_momentum,
-       length({row.angular_momentum_x - first_.angular_momentum_x, row.angular_momentum_y - first_.angular_momentum_y,
-               row.angular_momentum_z - first_.angular_momentum_z}),
-       angular_scale_);
-  grow(drift_.energy, std::abs(row.energy_residual), energy_scale_);
+  state_.momentum_scale = std::max(state_.momentum_scale, momentum_scale);
+  state_.angular_scale = std::max(state_.angular_scale, angular_scale);
+  state_.energy_scale = std::max(state_.energy_scale, row.kinetic_energy + std::abs(row.gravitational_energy));
+  grow(state_.drift.mass, std::abs(row.mass - state_.first.mass), state_.first.mass);
+  grow(state_.drift.momentum,
+       length({row.momentum_x - state_.first.momentum_x, row.momentum_y - state_.first.momentum_y,
+               row.momentum_z - state_.first.momentum_z}),
+       state_.momentum_scale);
+  grow(state_.drift.angular_momentum,
+       length({row.angular_momentum_x - state_.first.angular_momentum_x,
+               row.angular_momentum_y - state_.first.angular_momentum_y,
+               row.angular_momentum_z - state_.first.angular_momentum_z}),
+       state_.angular_scale);
+  grow(state_.drift.energy, std::abs(row.energy_residual), state_.energy_scale);
 }
 
 }  // namespace breccia::sim

@@ -6,14 +6,9 @@
 #include "io/diagnostics.hpp"
 #include "io/summary.hpp"
 #include "mpi/comm.hpp"
+#include "sim/run_state.hpp"
 
 namespace breccia::sim {
-
-/// Work lost to heat since the start, of this rank [J].
-struct LostWork {
-  double plastic = 0.0;
-  double viscous = 0.0;
-};
 
 /// Sums a row over all ranks and follows the drifts from the first row.
 class Budget {
@@ -30,7 +25,10 @@ class Budget {
   [[nodiscard]] std::vector<double> potential(const ParticleOutput& particles) const;
 
   /// Largest drifts seen so far.
-  [[nodiscard]] const io::Conservation& drift() const { return drift_; }
+  [[nodiscard]] const io::Conservation& drift() const { return state_.drift; }
+
+  [[nodiscard]] const BudgetState& state() const { return state_; }
+  void restore(const BudgetState& state) { state_ = state; }
 
  private:
   void check(const io::DiagnosticsRow& row) const;
@@ -39,12 +37,7 @@ class Budget {
   gravity::Solver* solver_;
   Vec3d uniform_gravity_;
   mpi::Comm comm_;
-  bool started_ = false;
-  io::DiagnosticsRow first_;
-  double momentum_scale_ = 0.0;  // largest sum m |v|
-  double angular_scale_ = 0.0;   // largest sum m |x cross v|
-  double energy_scale_ = 0.0;    // largest kinetic + |potential|
-  io::Conservation drift_;
+  BudgetState state_;
 };
 
 }  // namespace breccia::sim

@@ -22,8 +22,11 @@ std::string duration_text(double seconds) {
   return fmt::format("{} s", s);
 }
 
-Progress::Progress(double end, std::uint64_t max_steps, std::uint64_t particles, const mpi::Comm& comm)
-    : end_(end),
+Progress::Progress(double time, std::uint64_t step, double end, std::uint64_t max_steps, std::uint64_t particles,
+                   const mpi::Comm& comm)
+    : start_time_(time),
+      start_step_(step),
+      end_(end),
       max_steps_(max_steps),
       particles_(static_cast<double>(particles)),
       root_(comm.is_root()),
@@ -36,24 +39,27 @@ Progress::~Progress() {
 void Progress::update(double time, std::uint64_t step, double dt) {
   if (!root_) return;
   const auto now = Clock::now();
-  if (now < next_ || step == 0) return;
+  if (now < next_ || step == start_step_) return;
   next_ = now + (terminal_ ? Clock::duration(kTerminalPeriod) : Clock::duration(kPlainPeriod));
-  double fraction = end_ > 0.0 ? time / end_ : 1.0;
-  if (max_steps_ != 0) {
-    fraction = std::max(fraction, static_cast<double>(step) / static_cast<double>(max_steps_));
-  }
   const double elapsed = std::chrono::duration<double>(now - start_).count();
-  fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K" : "{}\n"),
-             line(std::min(fraction, 1.0), elapsed, time, step, dt));
+  fmt::print(stderr, fmt::runtime(terminal_ ? "\r{}\033[K" : "{}\n"), line(elapsed, time, step, dt));
   std::fflush(stderr);
   printed_ = true;
 }
 
-std::string Progress::line(double fraction, double elapsed, double time, std::uint64_t step, double dt) const {
-  const double rate = particles_ * static_cast<double>(step) / elapsed;
+double Progress::fraction(double time, std::uint64_t step) const {
+  double done = end_ > 0.0 ? time / end_ : 1.0;
+  if (max_steps_ != 0) done = std::max(done, static_cast<double>(step) / static_cast<double>(max_steps_));
+  return std::min(done, 1.0);
+}
+
+std::string Progress::line(double elapsed, double time, std::uint64_t step, double dt) const {
+  const double rate = particles_ * static_cast<double>(step - start_step_) / elapsed;
+  const double done = fraction(time, step);
+  const double done_here = done - fraction(start_time_, start_step_);
   return fmt::format("{:5.1f} %  t = {:.6g} s  step {}  dt = {:.4g} s  {:.3g} M particle-steps/s  {} left",
-                     100.0 * fraction, time, step, dt, 1e-6 * rate,
-                     fraction > 0.0 ? duration_text(elapsed * (1.0 - fraction) / fraction) : "?");
+                     100.0 * done, time, step, dt, 1e-6 * rate,
+                     done_here > 0.0 ? duration_text(elapsed * (1.0 - done) / done_here) : "?");
 }
 
 }  // namespace breccia::sim

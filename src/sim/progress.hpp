@@ -11,8 +11,9 @@ namespace breccia::sim {
 
 class Progress {
  public:
-  /// `end`: when the run ends [s]; `max_steps`: or after this many steps (0: no limit).
-  Progress(double end, std::uint64_t max_steps, std::uint64_t particles, const mpi::Comm& comm);
+  /// From `time` and `step` on. `end`: when the run ends [s]; `max_steps`: or after this many steps (0: no limit).
+  Progress(double time, std::uint64_t step, double end, std::uint64_t max_steps, std::uint64_t particles,
+           const mpi::Comm& comm);
   ~Progress();
   Progress(const Progress&) = delete;
   Progress& operator=(const Progress&) = delete;
@@ -21,9 +22,12 @@ class Progress {
   void update(double time, std::uint64_t step, double dt);
 
  private:
-  [[nodiscard]] std::string line(double fraction, double elapsed, double time, std::uint64_t step, double dt) const;
+  [[nodiscard]] double fraction(double time, std::uint64_t step) const;
+  [[nodiscard]] std::string line(double elapsed, double time, std::uint64_t step, double dt) const;
 
   using Clock = std::chrono::steady_clock;
+  double start_time_;
+  std::uint64_t start_step_;
   double end_;
   std::uint64_t max_steps_;
   double particles_;

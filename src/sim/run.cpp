@@ -5,13 +5,19 @@
 #include <chrono>
 #include <cmath>
 #include <cstdio>
+#include <fstream>
+#include <utility>
 
 #include "analysis/remnants.hpp"
+#include "breccia/error.hpp"
+#include "io/collectively.hpp"
 #include "io/output_folder.hpp"
 #include "io/remnants_json.hpp"
 #include "io/snapshot.hpp"
 #include "io/snapshot_series.hpp"
+#include "sim/checkpoints.hpp"
 #include "sim/progress.hpp"
+#include "sim/stop_requests.hpp"
 #include "sim/time_loop.hpp"
 
 namespace breccia::sim {
@@ -29,6 +35,15 @@ double target_mass(const Scene& scene) {
 class Schedule {
  public:
   explicit Schedule(double interval) : interval_(interval), next_(interval > 0.0 ? interval : HUGE_VAL) {}
+  // Goes on after a restart at `time`, also where the scene asks for another interval now.
+  void restore(const ScheduleState& state, double time) {
+    if (state.interval == interval_) {
+      next_ = state.next;
+    } else if (interval_ > 0.0) {
+      next_ = interval_ * std::max(1.0, std::ceil(time / interval_));
+    }
+  }
+  [[nodiscard]] ScheduleState state() const { return {interval_, next_}; }
   bool due(double time, double dt) {
     if (time + 0.5 * dt < next_) return false;
     while (next_ <= time + 0.5 * dt) next_ += interval_;
@@ -43,18 +58,35 @@ class Schedule {
 // Everything a run writes.
 class Output {
  public:
-  Output(const Scene& scene, const RunOptions& options, double end, Budget& budget, const mpi::Comm& comm)
+  Output(const Scene& scene, const RunOptions& options, double end, const std::optional<Restart>& restart,
+         Budget& budget, const mpi::Comm& comm)
       : scene_(scene),
         folder_(options.out),
         comm_(comm),
         budget_(budget),
-        diagnostics_(folder_ / "diagnostics.csv", comm),
+        diagnostics_(restart ? io::DiagnosticsWriter(folder_ / "diagnostics.csv", restart->run.loop.step, comm)
+                             : io::DiagnosticsWriter(folder_ / "diagnostics.csv", comm)),
         snapshots_(scene.output.snapshot_interval),
-        rows_(scene.output.diagnostics_interval > 0.0 ? scene.output.diagnostics_interval : end / kDefaultRows) {}
+        rows_(scene.output.diagnostics_interval > 0.0 ? scene.output.diagnostics_interval : end / kDefaultRows) {
+    if (!restart) return;
+    const OutputState& state = restart->run.output;
+    snapshots_.restore(state.snapshots, restart->run.loop.time);
+    rows_.restore(state.rows, restart->run.loop.time);
+    next_analysis_ = state.next_analysis;
+    snapshot_number_ = state.snapshot_number;
+    last_row_ = restart->run.budget.first;
+    io::cut_series(folder_, snapshot_number_, comm_);
+  }
+
+  [[nodiscard]] OutputState state() const {
+    return {snapshots_.state(), rows_.state(), next_analysis_, snapshot_number_, 0.0};
+  }
+  // A snapshot at the next t_n, whether due or not.
+  void want_snapshot() { snapshot_wanted_ = true; }
 
   // Writes what is due at this t_n; all of it at the first and the last one.
   void at(const TimeLoop& loop, bool force) {
-    const bool snapshot = snapshots_.due(loop.time(), loop.dt()) || force;
+    const bool snapshot = snapshots_.due(loop.time(), loop.dt()) || force || std::exchange(snapshot_wanted_, false);
     const bool row = rows_.due(loop.time(), loop.dt()) || force;
     const bool analysis = analysis_due(loop);
     if (!snapshot && !row && !analysis) return;
@@ -123,6 +155,7 @@ class Output {
   Schedule rows_;
   std::size_t next_analysis_ = 0;
   std::uint64_t snapshot_number_ = 0;
+  bool snapshot_wanted_ = false;
   io::DiagnosticsRow last_row_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
@@ -136,30 +169,132 @@ void print_profile(const StageTimers& timers, double wall) {
 
 std::filesystem::path default_folder(const Scene& scene) { return std::filesystem::path("out") / scene.name; }
 
+// A run's end as its summary.json has it: nothing is left to do if it reached this one.
+bool finished(const std::filesystem::path& folder, double end, const RunOptions& options, const mpi::Comm& comm) {
+  bool done = false;
+  io::on_root(comm, [&] {
+    std::ifstream file(folder / "summary.json");
+    if (!file) return;
+    const nlohmann::json summary = nlohmann::json::parse(file, nullptr, false);
+    if (summary.is_discarded() || !summary.contains("time_step")) return;
+    const double reached = summary.value("simulated_time", 0.0) + 0.5 * summary.value("time_step", 0.0);
+    done = reached >= end || (options.steps && summary.value("steps", std::uint64_t{0}) >= *options.steps);
+  });
+  return comm.any(done);
+}
+
+std::unique_ptr<TimeLoop> make_loop(const Scene& scene, const std::optional<Restart>& restart, int threads,
+                                    const mpi::Comm& comm) {
+  const ResolvedEffects effects = resolve_effects(scene);
+  if (!restart) return std::make_unique<TimeLoop>(scene, effects, threads, comm);
+  std::unique_ptr<TimeLoop> loop;
+  io::collectively(comm, [&] {
+    loop = std::make_unique<TimeLoop>(scene, effects, restart->engine, restart->run.loop, threads, comm);
+  });
+  return loop;
+}
+
+// What happens where a window begins: checkpoints, and the end of a run that is told to stop.
+class Interruptions {
+ public:
+  Interruptions(const RunOptions& options, const Scene& scene, double time, Output& output, const Budget& budget,
+                double wall_before, std::uint64_t first_checkpoint, const mpi::Comm& comm)
+      : options_(options),
+        output_(output),
+        budget_(budget),
+        wall_before_(wall_before),
+        requests_(options.out, options.walltime, start_, comm),
+        checkpoints_(options.out, scene.output, time, first_checkpoint, comm) {}
+
+  // False if the run is to stop.
+  bool at_window_start(const TimeLoop& loop) {
+    const auto now = Clock::now();
+    longest_window_ = std::max(longest_window_, std::chrono::duration<double>(now - window_start_).count());
+    const Requests requests = requests_.poll(kSafety * (longest_window_ + checkpoints_.seconds()) + kSlack);
+    if (requests.snapshot) output_.want_snapshot();
+    if (requests.stop != nullptr || checkpoints_.due(loop.time())) {
+      loop.timers()("checkpoint", [&] { write(loop); });
+    }
+    if (requests.stop != nullptr) {
+      stopped_ = fmt::format("stopped at t = {:.6g} s, step {}, because {}; {} is written, --restart auto continues",
+                             loop.time(), loop.step(), requests.stop, name_);
+    }
+    window_start_ = Clock::now();
+    return stopped_.empty();
+  }
+
+  // Ends the program if the run was stopped.
+  void end_if_stopped() const {
+    if (!stopped_.empty()) throw Error(ExitCode::kStopped, stopped_);
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  // A window and a checkpoint may take longer than the last ones did.
+  static constexpr double kSafety = 1.5;
+  static constexpr double kSlack = 1.0;  // [s]
+
+  void write(const TimeLoop& loop) {
+    RunState run{loop.state(), budget_.state(), output_.state(), options_.resolved};
+    run.output.wall_seconds = wall_before_ + std::chrono::duration<double>(Clock::now() - start_).count();
+    name_ = checkpoints_.write(loop.engine().save(), run);
+  }
+
+  const RunOptions& options_;
+  Output& output_;
+  const Budget& budget_;
+  double wall_before_;
+  Clock::time_point start_ = Clock::now();
+  StopRequests requests_;
+  Checkpoints checkpoints_;
+  Clock::time_point window_start_ = start_;
+  double longest_window_ = 0.0;
+  std::string name_;
+  std::string stopped_;
+};
+
 }  // namespace
 
 void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm) {
   RunOptions options = options_in;
   if (options.out.empty()) options.out = default_folder(scene);
-  io::prepare_output_folder(options.out, comm);
-
   const double end = options.until.value_or(scene.time.end);
-  const ResolvedEffects effects = resolve_effects(scene);
-  TimeLoop loop(scene, effects, options.threads, comm);
+  std::optional<Restart> restart;
+  if (options.restart.empty()) {
+    io::prepare_output_folder(options.out, comm);
+  } else {
+    if (options.restart == "auto" && finished(options.out, end, options, comm)) {
+      if (comm.is_root()) fmt::print("{}: this run is finished\n", options.out.string());
+      return;
+    }
+    io::continue_output_folder(options.out, comm);
+    restart = find_restart(options.restart, options.out, scene, options.resolved, comm);
+  }
+
+  const std::unique_ptr<TimeLoop> owned = make_loop(scene, restart, options.threads, comm);
+  TimeLoop& loop = *owned;
   Budget budget(loop.solver(), scene.gravity.uniform, comm);
-  Output output(scene, options, end, budget, comm);
+  if (restart) budget.restore(restart->run.budget);
+  Output output(scene, options, end, restart, budget, comm);
+  const double wall_before = restart ? restart->run.output.wall_seconds : 0.0;
+  const std::uint64_t first_checkpoint = restart ? restart->next_number : 0;
+  restart.reset();
   std::uint64_t particles = 0;
   for (const BodyParameters& b : scene.bodies) particles += b.particles;
   io::RunSummary summary;
   const auto start = std::chrono::steady_clock::now();
   {
-    Progress progress(end, options.steps.value_or(0), particles, comm);
-    loop.run([&](const TimeLoop& now) {
-      const bool last = now.time() + 0.5 * now.dt() >= end || (options.steps && now.step() >= *options.steps);
-      output.at(now, last || now.step() == 0);
-      progress.update(now.time(), now.step(), now.dt());
-      return !last;
-    });
+    Interruptions interruptions(options, scene, loop.time(), output, budget, wall_before, first_checkpoint, comm);
+    Progress progress(loop.time(), loop.step(), end, options.steps.value_or(0), particles, comm);
+    loop.run(
+        [&](const TimeLoop& now) {
+          const bool last = now.time() + 0.5 * now.dt() >= end || (options.steps && now.step() >= *options.steps);
+          output.at(now, last || now.step() == 0);
+          progress.update(now.time(), now.step(), now.dt());
+          return !last;
+        },
+        [&](const TimeLoop& now) { return interruptions.at_window_start(now); });
+    interruptions.end_if_stopped();
   }
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
 
@@ -172,10 +307,11 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   summary.conservation = budget.drift();
   summary.damaged_fraction = output.last_row().damaged_fraction;
   summary.remnants = output.remnants(loop.engine().observe());
-  summary.wall_seconds = wall;
+  summary.time_step = loop.dt();
+  summary.wall_seconds = wall_before + wall;
   for (const StageTimers::Stage& s : loop.timers().stages()) {
     summary.stages.push_back({std::string(s.name), s.seconds, s.calls});
-    if (s.name == "output") summary.wall_seconds -= s.seconds;
+    if (s.name == "output" || s.name == "checkpoint") summary.wall_seconds -= s.seconds;
   }
   summary.scene = options.resolved;
   io::write_summary(options.out / "summary.json", summary, comm);

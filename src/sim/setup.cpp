@@ -36,8 +36,8 @@ std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const Resol
   return make_loaded_engine(scene, effects, scene::make_particles(scene, comm), threads, comm);
 }
 
-std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
-                                                 const ParticleArrays& particles, int threads, const mpi::Comm& comm) {
+std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
+                                                const mpi::Comm& comm) {
   grid::EngineSetup setup;
   setup.cell = scene.cell;
   setup.materials = scene.materials;
@@ -47,8 +47,12 @@ std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const Resol
   setup.uniform_gravity = scene.gravity.uniform;
   setup.numerics = scene.numerics;
   setup.threads = threads;
-  auto engine = grid::make_engine(setup, comm);
+  return grid::make_engine(setup, comm);
+}
 
+std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
+                                                 const ParticleArrays& particles, int threads, const mpi::Comm& comm) {
+  auto engine = make_empty_engine(scene, effects, threads, comm);
   material::FlawLists flaws;
   if (effects.material.damage) {
     flaws = draw_all_flaws(scene, particles);

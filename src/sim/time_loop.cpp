@@ -32,41 +32,76 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
   const grid::SignalSpeeds speeds = engine_->signal_speeds();
   dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
   set_sort_interval(speeds.particle * dt_ / scene_.cell);
-  if (effects.gravity) {
-    const gravity::Parameters parameters{
-        .softening = scene.gravity.softening,
-        .precision = scene.numerics.precision,
-        .mesh = {.particle_spacing = mean_spacing(scene), .cell = scene.gravity.mesh, .split = scene.gravity.split},
-        .error = scene.gravity.error,
-        .opening = scene.gravity.opening};
-    solver_ = gravity::make_solver(effects.gravity_method, parameters, comm, threads);
-    evaluate_gravity();
-  }
+  make_solver(effects, threads);
+  if (solver_) evaluate_gravity();
   engine_->kick_velocities(0.5 * dt_);
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * dt_); });
 }
 
-void TimeLoop::run(const std::function<bool(const TimeLoop&)>& at_time_step) {
+TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const EngineState& engine,
+                   const LoopState& state, int threads, const mpi::Comm& comm)
+    : scene_(scene),
+      viscosity_(effects.material.viscosity),
+      adaptive_(!scene.time.step),
+      comm_(comm),
+      engine_(make_empty_engine(scene, effects, threads, comm)),
+      window_(scene.gravity.interval),
+      time_(state.time),
+      dt_(state.dt),
+      previous_dt_(state.previous_dt),
+      step_(state.step),
+      sort_interval_(state.sort_interval) {
+  make_solver(effects, threads);
+  engine_->restore(engine);
+  const auto rank = static_cast<std::size_t>(comm.rank());
+  if (state.lost.size() == static_cast<std::size_t>(comm.size())) {
+    lost_ = state.lost[rank];
+  } else if (comm.is_root()) {
+    for (const LostWork& work : state.lost) {
+      lost_.plastic += work.plastic;
+      lost_.viscous += work.viscous;
+    }
+  }
+  timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
+  book_pass();
+}
+
+void TimeLoop::make_solver(const ResolvedEffects& effects, int threads) {
+  if (!effects.gravity) return;
+  const gravity::Parameters parameters{
+      .softening = scene_.gravity.softening,
+      .precision = scene_.numerics.precision,
+      .mesh = {.particle_spacing = mean_spacing(scene_), .cell = scene_.gravity.mesh, .split = scene_.gravity.split},
+      .error = scene_.gravity.error,
+      .opening = scene_.gravity.opening};
+  solver_ = gravity::make_solver(effects.gravity_method, parameters, comm_, threads);
+}
+
+LoopState TimeLoop::state() const { return {time_, dt_, previous_dt_, step_, sort_interval_, comm_.allgather(lost_)}; }
+
+void TimeLoop::run(const Visit& at_time_step, const Visit& at_window_start) {
   for (;;) {
     // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
     timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
     if (!at_time_step(*this)) return;
-    one_step();
+    if (!one_step(at_window_start)) return;
   }
 }
 
-void TimeLoop::one_step() {
+bool TimeLoop::one_step(const Visit& at_window_start) {
   window_.advance();
   if (window_.due() || sorting_due()) {
     timers_("g2p", [&] { engine_->gather(dt_); });
     book_pass();
     between_steps();
+    if (window_.due() && !at_window_start(*this)) return false;
     timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
   } else {
     timers_("g2p, stress, p2g", [&] { engine_->gather_scatter(dt_); });
     count_step();
   }
   book_pass();
+  return true;
 }
 
 void TimeLoop::count_step() {

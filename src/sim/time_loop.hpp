@@ -16,12 +16,24 @@ namespace breccia::sim {
 
 class TimeLoop {
  public:
+  using Visit = std::function<bool(const TimeLoop&)>;
+
   /// Makes the engine with its particles, evaluates gravity, sets v^{-1/2} and scatters for the first time. Collective.
   TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm);
 
+  /// Goes on from a state that engine().save() and state() gave, without anything being computed anew. Collective.
+  TimeLoop(const Scene& scene, const ResolvedEffects& effects, const EngineState& engine, const LoopState& state,
+           int threads, const mpi::Comm& comm);
+
   /// Steps until `at_time_step` returns false; it is called at every t_n, when the grid holds v^{n-1/2} and v^{n+1/2}
   /// and observe() is meaningful. Collective.
-  void run(const std::function<bool(const TimeLoop&)>& at_time_step);
+  /// `at_window_start` is called at the state boundary where a window begins, after sorting, gravity and the choice of
+  /// dt: there engine().save() and state() are the whole run. It may end the run as well.
+  void run(
+      const Visit& at_time_step, const Visit& at_window_start = [](const TimeLoop&) { return true; });
+
+  /// Only at a window start. Collective.
+  [[nodiscard]] LoopState state() const;
 
   [[nodiscard]] double time() const { return time_; }
   [[nodiscard]] std::uint64_t step() const { return step_; }
@@ -32,7 +44,8 @@ class TimeLoop {
   [[nodiscard]] StageTimers& timers() const { return timers_; }
 
  private:
-  void one_step();
+  bool one_step(const Visit& at_window_start);
+  void make_solver(const ResolvedEffects& effects, int threads);
   void count_step();
   void between_steps();
   void begin_window();

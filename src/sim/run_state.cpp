@@ -1,0 +1,172 @@
+#include "sim/run_state.hpp"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <map>
+#include <string_view>
+#include <variant>
+
+#include "breccia/error.hpp"
+
+namespace breccia::sim {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// JSON has no infinity: an output that never comes is null.
+Json finite_or_null(double x) { return std::isfinite(x) ? Json(x) : Json(); }
+double null_is_never(const Json& json) { return json.is_null() ? HUGE_VAL : json.get<double>(); }
+
+Json row_json(const io::DiagnosticsRow& row) {
+  Json json;
+  for (const io::DiagnosticsColumn& column : io::diagnostics_columns()) {
+    std::visit([&](auto member) { json[column.name] = row.*member; }, column.value);
+  }
+  return json;
+}
+
+io::DiagnosticsRow row_from(const Json& json) {
+  io::DiagnosticsRow row;
+  for (const io::DiagnosticsColumn& column : io::diagnostics_columns()) {
+    std::visit([&](auto member) { json.at(column.name).get_to(row.*member); }, column.value);
+  }
+  return row;
+}
+
+Json loop_json(const LoopState& loop) {
+  Json lost = Json::array();
+  for (const LostWork& work : loop.lost) lost.push_back({work.plastic, work.viscous});
+  return {{"time", loop.time},
+          {"dt", loop.dt},
+          {"previous_dt", loop.previous_dt},
+          {"step", loop.step},
+          {"sort_interval", loop.sort_interval},
+          {"lost_work", lost}};
+}
+
+LoopState loop_from(const Json& json) {
+  LoopState loop;
+  json.at("time").get_to(loop.time);
+  json.at("dt").get_to(loop.dt);
+  json.at("previous_dt").get_to(loop.previous_dt);
+  json.at("step").get_to(loop.step);
+  json.at("sort_interval").get_to(loop.sort_interval);
+  for (const Json& work : json.at("lost_work")) {
+    loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>()});
+  }
+  return loop;
+}
+
+Json budget_json(const BudgetState& budget) {
+  return {{"started", budget.started},
+          {"first", row_json(budget.first)},
+          {"momentum_scale", budget.momentum_scale},
+          {"angular_scale", budget.angular_scale},
+          {"energy_scale", budget.energy_scale},
+          {"drift", {budget.drift.mass, budget.drift.momentum, budget.drift.angular_momentum, budget.drift.energy}}};
+}
+
+BudgetState budget_from(const Json& json) {
+  BudgetState budget;
+  json.at("started").get_to(budget.started);
+  budget.first = row_from(json.at("first"));
+  json.at("momentum_scale").get_to(budget.momentum_scale);
+  json.at("angular_scale").get_to(budget.angular_scale);
+  json.at("energy_scale").get_to(budget.energy_scale);
+  const Json& drift = json.at("drift");
+  budget.drift = {drift.at(0).get<double>(), drift.at(1).get<double>(), drift.at(2).get<double>(),
+                  drift.at(3).get<double>()};
+  return budget;
+}
+
+Json schedule_json(const ScheduleState& schedule) {
+  return {{"interval", schedule.interval}, {"next", finite_or_null(schedule.next)}};
+}
+
+ScheduleState schedule_from(const Json& json) {
+  return {json.at("interval").get<double>(), null_is_never(json.at("next"))};
+}
+
+Json output_json(const OutputState& output) {
+  return {{"snapshots", schedule_json(output.snapshots)},
+          {"rows", schedule_json(output.rows)},
+          {"next_analysis", output.next_analysis},
+          {"snapshot_number", output.snapshot_number},
+          {"wall_seconds", output.wall_seconds}};
+}
+
+OutputState output_from(const Json& json) {
+  OutputState output;
+  output.snapshots = schedule_from(json.at("snapshots"));
+  output.rows = schedule_from(json.at("rows"));
+  json.at("next_analysis").get_to(output.next_analysis);
+  json.at("snapshot_number").get_to(output.snapshot_number);
+  json.at("wall_seconds").get_to(output.wall_seconds);
+  return output;
+}
+
+// Keys that neither the particles nor their fields depend on. Those that end in '.' stand for all below.
+constexpr std::array<std::string_view, 10> kHarmless{
+    "output.",          "scene.name",      "scene.end",    "time.cfl",      "effects.gravity",
+    "gravity.interval", "gravity.opening", "gravity.mesh", "gravity.split", "gravity.error"};
+
+bool harmless(const std::string& key) {
+  return std::ranges::any_of(kHarmless,
+                             [&](std::string_view k) { return k.ends_with('.') ? key.starts_with(k) : key == k; });
+}
+
+// Gravity as a whole cannot come or go: its method may change.
+std::string comparable(const std::string& key, const std::string& value) {
+  if (key == "effects.gravity") return value == "off" ? "off" : "on";
+  return harmless(key) ? "" : value;
+}
+
+}  // namespace
+
+std::string to_text(const RunState& state) {
+  Json scene = Json::object();
+  for (const ResolvedKey& key : state.scene) scene[key.key] = key.value;
+  const Json json{{"loop", loop_json(state.loop)},
+                  {"budget", budget_json(state.budget)},
+                  {"output", output_json(state.output)},
+                  {"scene", scene}};
+  return json.dump(1);
+}
+
+RunState run_state_from(const std::string& text) {
+  try {
+    const Json json = Json::parse(text);
+    RunState state;
+    state.loop = loop_from(json.at("loop"));
+    state.budget = budget_from(json.at("budget"));
+    state.output = output_from(json.at("output"));
+    for (const auto& [key, value] : json.at("scene").items()) state.scene.push_back({key, value.get<std::string>()});
+    return state;
+  } catch (const nlohmann::json::exception& error) {
+    throw IoError(std::string("the state of the run cannot be read: ") + error.what());
+  }
+}
+
+void require_same_scene(const std::vector<ResolvedKey>& checkpoint, const std::vector<ResolvedKey>& scene,
+                        const std::string& file) {
+  std::map<std::string, std::pair<std::string, std::string>> values;
+  for (const ResolvedKey& key : checkpoint) values[key.key].first = comparable(key.key, key.value);
+  for (const ResolvedKey& key : scene) values[key.key].second = comparable(key.key, key.value);
+  std::string changed;
+  for (const auto& [key, pair] : values) {
+    if (pair.first == pair.second) continue;
+    const auto shown = [](const std::string& value) { return value.empty() ? std::string("not set") : value; };
+    changed += fmt::format("{}{} ({} there, {} here)", changed.empty() ? "" : ", ", key, shown(pair.first),
+                           shown(pair.second));
+  }
+  if (changed.empty()) return;
+  throw UsageError(
+      fmt::format("{} is of another scene: {}; take these keys as they were, or start anew without "
+                  "--restart in another folder",
+                  file, changed));
+}
+
+}  // namespace breccia::sim

@@ -1,0 +1,202 @@
+"""Stopping and continuing a run: what it goes on with, what it refuses, which files there are then."""
+
+import csv
+import json
+import os
+import re
+import signal
+import subprocess
+import time
+import unittest
+
+from command import BRECCIA, MPIRUN, SCENE, CommandTest, breccia
+
+EVERY_WINDOW = '\n[gravity]\ninterval = 8\n[output]\ncheckpoint_time = "every 2 s"\nsnapshots = "every 6 s"\n'
+STOPPED = 75
+
+
+def summary(folder):
+    return json.loads((folder / "summary.json").read_text())
+
+
+def rows(folder):
+    with open(folder / "diagnostics.csv") as file:
+        return [{k: v for k, v in row.items() if not k.startswith("wall")} for row in csv.DictReader(file)]
+
+
+def checkpoints(folder):
+    return sorted(path.name for path in folder.glob("chk_*"))
+
+
+class Restart(CommandTest):
+    def setUp(self):
+        super().setUp()
+        self.scene = self.write_scene(SCENE + EVERY_WINDOW)
+
+    def run_scene(self, out, *arguments, ranks=1, code=0):
+        process = breccia("run", self.scene, "--out", self.folder / out, *arguments, ranks=ranks)
+        self.assertEqual(process.returncode, code, process.stderr)
+        return process
+
+    def assert_same_run(self, one, other):
+        """Every figure but the wall times: a restart is not to be seen in the results."""
+        one, other = self.folder / one, self.folder / other
+        self.assertEqual(rows(one), rows(other))
+        self.assertEqual((one / "run.hdf.series").read_text(), (other / "run.hdf.series").read_text())
+        for key in ("steps", "simulated_time", "conservation", "remnants"):
+            self.assertEqual(summary(one)[key], summary(other)[key], key)
+
+    def test_stop_file_and_continuation(self):
+        for ranks in (1, 2):
+            with self.subTest(ranks=ranks):
+                whole, parts = f"whole{ranks}", f"parts{ranks}"
+                self.run_scene(whole, "--until", "20 s", ranks=ranks)
+                # The run that is stopped finds the file at its first window, the next one at its first again.
+                (self.folder / parts).mkdir()
+                stop = self.folder / parts / "stop"
+                process = self.start_until_rows(parts, ranks)
+                stop.touch()
+                errors = process.communicate(timeout=60)[1]
+                self.assertEqual(process.returncode, STOPPED, errors)
+                self.assertIn("a file named stop", errors)
+                self.assertFalse(stop.exists())
+                steps = int(re.search(r"stopped at .*step (\d+)", errors)[1])
+                self.assertEqual(steps % 8, 0)
+                # Past 20 s the run would have to be cut back, which is what dropping later rows is for; it ends before.
+                process = self.run_scene(parts, "--restart", "auto", "--until", "20 s", ranks=ranks)
+                self.assertIn("continuing from", process.stderr)
+                if steps <= 80:
+                    self.assert_same_run(whole, parts)
+
+    def start_until_rows(self, out, ranks):
+        """A running process that has written its first row; it would take hours to end."""
+        command = [BRECCIA, "run", self.scene, "--out", self.folder / out, "--restart", "auto", "--set", "scene.end=1e6 s"]
+        command += ["--set", "output.diagnostics=every 0.5 s"]
+        if ranks > 1:
+            command = [MPIRUN, "-n", str(ranks), *command]
+        environment = dict(os.environ, OMPI_MCA_orte_execute_quiet="1")
+        process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+        self.addCleanup(process.kill)
+        deadline = time.monotonic() + 60
+        while time.monotonic() < deadline:
+            path = self.folder / out / "diagnostics.csv"
+            if path.exists() and path.read_text().count("\n") > 1:
+                return process
+            time.sleep(0.01)
+        self.fail("the run does not start")
+
+    def test_signals(self):
+        for ranks, number in ((1, signal.SIGUSR1), (2, signal.SIGUSR1), (1, signal.SIGTERM), (1, signal.SIGINT)):
+            with self.subTest(ranks=ranks, signal=number.name):
+                out = f"{number.name}{ranks}"
+                process = self.start_until_rows(out, ranks)
+                process.send_signal(number)
+                errors = process.communicate(timeout=60)[1]
+                self.assertEqual(process.returncode, STOPPED, errors)
+                self.assertIn(number.name, errors)
+                self.assertNotIn("error", errors)
+                self.assertGreater(len(checkpoints(self.folder / out)), 0)
+
+    def test_walltime(self):
+        start = time.monotonic()
+        process = breccia("run", self.scene, "--out", self.folder / "out", "--until", "1e6 s", "--walltime", "0:0:3")
+        self.assertEqual(process.returncode, STOPPED, process.stderr)
+        self.assertLess(time.monotonic() - start, 10)
+        self.assertIn("wall time", process.stderr)
+
+    def test_snapshot_on_demand(self):
+        (self.folder / "out").mkdir()
+        (self.folder / "out" / "output_now").touch()
+        (self.folder / "out" / "diagnostics.csv").touch()
+        self.run_scene("out", "--restart", "auto", "--steps", 16)
+        self.assertFalse((self.folder / "out" / "output_now").exists())
+        series = json.loads((self.folder / "out" / "run.hdf.series").read_text())
+        self.assertEqual([file["time"] for file in series["files"]], [0, 2, 4])
+
+    def test_continuation_after_a_loss(self):
+        """Killed somewhere after a checkpoint: what was written since is dropped and comes again."""
+        for ranks in (1, 2):
+            whole, parts = f"w{ranks}", f"p{ranks}"
+            self.run_scene(whole, "--until", "20 s", "--set", "scene.end=100 s", ranks=ranks)
+            self.run_scene(parts, "--steps", 53, ranks=ranks)
+            with open(self.folder / parts / "diagnostics.csv", "a") as file:
+                file.write("13.5,54,0.2")
+            self.run_scene(parts, "--until", "20 s", "--restart", "auto", ranks=ranks)
+            self.assert_same_run(whole, parts)
+
+    def test_newest_stay(self):
+        self.run_scene("out", "--steps", 60)
+        self.assertEqual(checkpoints(self.folder / "out"), ["chk_0005.h5", "chk_0006.h5"])
+        self.run_scene("three", "--steps", 60, "--set", "output.keep=3", "--set", "output.checkpoint_time=off")
+        self.assertEqual(checkpoints(self.folder / "three"), [])
+
+    def test_damaged_ones_are_passed_over(self):
+        for ranks in (1, 2):
+            out = f"out{ranks}"
+            self.run_scene("whole", "--restart", "auto", "--until", "20 s")
+            self.run_scene(out, "--steps", 60)
+            newest = self.folder / out / "chk_0006.h5"
+            intact = newest.read_bytes()
+            before = self.folder / out / "chk_0005.h5"
+            older = before.read_bytes()
+            flipped = bytearray(intact)
+            flipped[len(intact) // 2] ^= 1
+            for damaged, word in ((bytes(flipped), "checksum"), (intact[:-1000], "truncated"), (b"", "truncated")):
+                for path in (self.folder / out).glob("chk_*"):
+                    path.unlink()
+                newest.write_bytes(damaged)
+                before.write_bytes(older)
+                process = self.run_scene(out, "--restart", "auto", "--steps", 61, ranks=ranks)
+                for text in ("warning", "chk_0006.h5", word, "chk_0005.h5"):
+                    self.assertIn(text, process.stderr)
+                # What comes next takes the number of the damaged one.
+                self.assertEqual(checkpoints(self.folder / out), ["chk_0005.h5", "chk_0006.h5"])
+                newest.write_bytes(damaged)
+                self.assert_fails(
+                    breccia("run", self.scene, "--out", self.folder / out, "--restart", newest, ranks=ranks),
+                    4, "chk_0006.h5", word,
+                )
+                (self.folder / out / "summary.json").unlink()
+            (self.folder / out / "chk_0005.h5").write_bytes(b"nothing")
+            self.assert_fails(
+                breccia("run", self.scene, "--out", self.folder / out, "--restart", "auto", ranks=ranks),
+                4, "chk_0006.h5", "chk_0005.h5",
+            )
+
+    def test_changed_scene(self):
+        self.run_scene("out", "--steps", 20)
+        before = {path.name: path.read_bytes() for path in (self.folder / "out").iterdir()}
+        for key, value in (
+            ("grid.cell", "11 km"),
+            ("numerics.precision", "double"),
+            ("materials.basalt.cohesion", "1e6 Pa"),
+            ("body[0].particles", "301"),
+            ("effects.gravity", "off"),
+            ("time.step", "0.125 s"),
+        ):
+            process = breccia(
+                "run", self.scene, "--out", self.folder / "out", "--restart", "auto", "--set", f"{key}={value}"
+            )
+            self.assert_fails(process, 2, key)
+        self.assertEqual(before, {path.name: path.read_bytes() for path in (self.folder / "out").iterdir()})
+        self.run_scene(
+            "out", "--restart", "auto", "--steps", 24, "--set", "scene.end=50 s", "--set", "effects.gravity=tree",
+            "--set", "output.snapshots=every 1 s",
+        )
+        self.assertEqual(summary(self.folder / "out")["steps"], 24)
+
+    def test_finished_and_new_runs(self):
+        self.run_scene("out", "--restart", "auto", "--until", "5 s")
+        before = {path.name: path.read_bytes() for path in (self.folder / "out").iterdir()}
+        self.run_scene("out", "--restart", "auto", "--until", "5 s")
+        self.assertEqual(before, {path.name: path.read_bytes() for path in (self.folder / "out").iterdir()})
+        (self.folder / "other").mkdir()
+        (self.folder / "other" / "thesis.tex").touch()
+        process = breccia("run", self.scene, "--out", self.folder / "other", "--restart", "auto")
+        self.assert_fails(process, 2, "thesis.tex")
+        process = breccia("run", self.scene, "--out", self.folder / "new", "--restart", "absent.h5")
+        self.assert_fails(process, 4, "absent.h5")
+
+
+if __name__ == "__main__":
+    unittest.main()
