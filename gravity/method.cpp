@@ -12,6 +12,10 @@ constexpr std::uint64_t kDirectParticles = 2000;
 constexpr double kSmallestTreeError = 1e-6;
 constexpr double kSmallestMeshError = 3e-5;
 
+// Errors of a mesh are those of near neighbours, whose pull compares to the body's as spacing to radius: the split
+// follows from gravity.error for bodies of 47,324 particles, and smaller ones get more.
+constexpr std::uint64_t kLeastMeshParticles = 30'000;
+
 // Times relative to the tree's per particle, measured in states (a), (b), (c) of gravity.md 3 with 94,648 particles:
 // pairs and sorting in a box, transforms, and the tree that is left where particles lie outside or boxes are several.
 constexpr double kBoxedParticle = 0.4;
@@ -61,6 +65,11 @@ MethodChoice cheapest_method(const Matter& matter, double error) {
   if (error < kSmallestMeshError) {
     return {GravityMethod::kTree,
             fmt::format("tree, as gravity.error is below {:.0e}, the mesh's best", kSmallestMeshError)};
+  }
+  if (matter.in_boxes < kLeastMeshParticles * static_cast<std::uint64_t>(matter.boxes)) {
+    return {
+        GravityMethod::kTree,
+        fmt::format("tree, as dense bodies of less than {} particles are too coarse for a mesh", kLeastMeshParticles)};
   }
   const double cost = mesh_over_tree(matter);
   const double percent = 100.0 * static_cast<double>(matter.in_boxes) / static_cast<double>(matter.particles);

@@ -13,10 +13,10 @@ double mesh_nodes(const Box& box, double cell) {
 
 namespace {
 
-// Blocks of space are this many mean distances wide, 64 particles where it is full, and dense from 8 on.
+// Blocks of space are this many mean distances wide, 64 particles where it is full. What has swelled much beyond that
+// would have its neighbours beyond the reach of the pairs.
 constexpr double kBlockWidth = 4.0;
-constexpr std::int64_t kFullCount = 64;
-constexpr std::int64_t kDenseCount = 8;
+constexpr std::int64_t kDenseCount = 24;
 
 constexpr double kLeastParticlesPerNode = 0.05;
 
@@ -175,7 +175,7 @@ std::int64_t count_at(const std::vector<std::int64_t>& sorted, double fraction) 
 // crowded tenth, as a body of a tenth of the mass may get a box whatever there is around it.
 std::int64_t median_dense_count(std::vector<std::int64_t> counts) {
   std::sort(counts.begin(), counts.end());
-  const std::int64_t least = count_at(counts, 1.0 - kLeastBoxMass) / (kFullCount / kDenseCount);
+  const std::int64_t least = count_at(counts, 1.0 - kLeastBoxMass) / 8;
   counts.erase(counts.begin(), std::lower_bound(counts.begin(), counts.end(), least));
   return count_at(counts, 0.5);
 }

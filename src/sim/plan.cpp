@@ -60,7 +60,7 @@ gravity::Matter matter_at_start(const Scene& scene) {
       continue;
     matter.in_boxes += b.particles;
     matter.mesh_nodes += gravity::mesh_nodes({b.position - b.semi_axes, b.position + b.semi_axes}, cell);
-    matter.boxes = 1;
+    ++matter.boxes;
   }
   return matter;
 }
