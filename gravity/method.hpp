@@ -28,7 +28,8 @@ struct MethodChoice {
 bool prefers_direct_sum(std::uint64_t particles, double error);
 
 /// The method kAuto stands for. Where dense bodies hold most particles the particle mesh is cheaper than the tree, and
-/// leaves a body a spurious acceleration hundreds of times smaller (gravity.md 3); elsewhere it would pay twice.
+/// leaves bodies without debris a spurious acceleration hundreds of times smaller (gravity.md 3); elsewhere it would
+/// pay twice.
 MethodChoice cheapest_method(const Matter& matter, double error);
 
 }  // namespace breccia::gravity
