@@ -1,12 +1,37 @@
 #include "gravity/auto_solver.hpp"
 
+#include "gravity/evaluation.hpp"
+
 namespace breccia::gravity {
 
-void AutoSolver::evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) {
-  const std::uint64_t all = comm_.sum(static_cast<std::uint64_t>(particles.position.size()));
-  const bool direct = cheapest_method(all, parameters_.error) == GravityMethod::kDirect;
-  used_ = direct ? static_cast<Solver*>(&direct_) : &tree_;
-  used_->evaluate(particles, acceleration, potential);
+template <class Real>
+void AutoSolver<Real>::evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) {
+  check_sizes(particles, acceleration, potential);
+  Phases choosing;
+  Layout layout;
+  Matter matter{.particles = comm_.sum(static_cast<std::uint64_t>(particles.position.size()))};
+  if (!prefers_direct_sum(matter.particles, parameters_.error)) {
+    choosing.time(Phase::kBoxes, [&] {
+      layout = lay_boxes(particles, parameters_.mesh, comm_);
+      matter = matter_of(layout, comm_);
+    });
+    parameters_.mesh.particle_spacing = layout.spacing;
+  }
+  const MethodChoice choice = cheapest_method(matter, parameters_.error);
+  if (choice.method == GravityMethod::kTreePm) {
+    mesh_.evaluate_in(layout, particles, acceleration, potential);
+    stats_ = mesh_.last();
+  } else {
+    Solver& solver = choice.method == GravityMethod::kTree ? static_cast<Solver&>(tree_) : direct_;
+    solver.evaluate(particles, acceleration, potential);
+    stats_ = solver.last();
+  }
+  stats_.reason = choice.reason;
+  stats_.seconds += choosing[Phase::kBoxes];
+  stats_.phases[Phase::kBoxes] = choosing[Phase::kBoxes];
 }
+
+template class AutoSolver<float>;
+template class AutoSolver<double>;
 
 }  // namespace breccia::gravity

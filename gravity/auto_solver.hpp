@@ -2,25 +2,33 @@
 #pragma once
 
 #include "gravity/direct_sum.hpp"
+#include "gravity/mesh/tree_pm.hpp"
 #include "gravity/tree/tree_solver.hpp"
 
 namespace breccia::gravity {
 
-/// Direct sum or tree, by the number of particles of all ranks.
+/// Direct sum, tree or particle mesh, by what cheapest_method() says of the particles of all ranks. The boxes found for
+/// the choice are those the mesh then uses; where the tree is chosen nothing else of the mesh is paid.
+template <class Real>
 class AutoSolver final : public Solver {
  public:
   AutoSolver(const Parameters& parameters, const mpi::Comm& comm, int threads)
-      : parameters_(parameters), comm_(comm), direct_(parameters, comm, threads), tree_(parameters, comm, threads) {}
+      : parameters_(parameters),
+        comm_(comm),
+        direct_(parameters, comm, threads),
+        tree_(parameters, comm, threads),
+        mesh_(parameters, comm, threads) {}
 
   void evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) override;
-  [[nodiscard]] const Stats& last() const override { return used_->last(); }
+  [[nodiscard]] const Stats& last() const override { return stats_; }
 
  private:
   Parameters parameters_;
   mpi::Comm comm_;
   DirectSum direct_;
   TreeSolver tree_;
-  Solver* used_ = &direct_;
+  TreePm<Real> mesh_;
+  Stats stats_;
 };
 
 }  // namespace breccia::gravity

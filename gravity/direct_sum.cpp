@@ -21,17 +21,19 @@ DirectSum::DirectSum(const Parameters& parameters, const mpi::Comm& comm, int th
 
 void DirectSum::evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) {
   check_sizes(particles, acceleration, potential);
-  stats_ = {};
+  stats_ = {.method = GravityMethod::kDirect};
   const Stopwatch watch(stats_.seconds);
   const auto targets = static_cast<std::size_t>(padded(static_cast<std::int64_t>(particles.position.size())));
   for (std::size_t c = 0; c < 4; ++c) sums_[c].assign(c < 3 || !potential.empty() ? targets : 0, 0.0);
 
   const double mass_unit = heaviest(particles.mass, comm_);
-  if (parameters_.precision == Precision::kMixed) {
-    sum_over_ring(float_ring_, particles, mass_unit);
-  } else {
-    sum_over_ring(double_ring_, particles, mass_unit);
-  }
+  stats_.phases.time(Phase::kPairs, [&] {
+    if (parameters_.precision == Precision::kMixed) {
+      sum_over_ring(float_ring_, particles, mass_unit);
+    } else {
+      sum_over_ring(double_ring_, particles, mass_unit);
+    }
+  });
   write(particles, mass_unit, acceleration, potential);
 
   book_momentum(particles, acceleration, comm_, stats_);

@@ -10,20 +10,6 @@
 #include "gravity/tree/tree_solver.hpp"
 
 namespace breccia::gravity {
-namespace {
-
-// Below this the direct sum is faster on one core (measured; gravity.md 3), and exact.
-constexpr std::uint64_t kDirectParticles = 2000;
-
-// Below this error the tree's float fields no longer follow the opening.
-constexpr double kSmallestTreeError = 1e-6;
-
-}  // namespace
-
-GravityMethod cheapest_method(std::uint64_t all_particles, double error) {
-  const bool direct = all_particles <= kDirectParticles || error < kSmallestTreeError;
-  return direct ? GravityMethod::kDirect : GravityMethod::kTree;
-}
 
 std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& parameters, const mpi::Comm& comm,
                                     int threads) {
@@ -36,7 +22,10 @@ std::unique_ptr<Solver> make_solver(GravityMethod method, const Parameters& para
   }
   switch (method) {
     case GravityMethod::kAuto:
-      return std::make_unique<AutoSolver>(parameters, comm, threads);
+      if (parameters.precision == Precision::kDouble) {
+        return std::make_unique<AutoSolver<double>>(parameters, comm, threads);
+      }
+      return std::make_unique<AutoSolver<float>>(parameters, comm, threads);
     case GravityMethod::kDirect:
       return std::make_unique<DirectSum>(parameters, comm, threads);
     case GravityMethod::kOff:

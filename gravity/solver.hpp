@@ -3,6 +3,7 @@
 
 #include <memory>
 #include <span>
+#include <string>
 
 #include "breccia/linalg.hpp"
 #include "breccia/scene.hpp"
@@ -40,13 +41,14 @@ struct Parameters {
 /// What one evaluation cost and how well it conserved momentum. Seconds, pairs and bytes are this rank's.
 struct Stats {
   double seconds = 0.0;
-  double build_seconds = 0.0;      ///< sorting, tree and moments
   double pairs = 0.0;              ///< particle with particle
   double cell_interactions = 0.0;  ///< particle with cell
   double expansions = 0.0;         ///< cell with cell
   double bytes_sent = 0.0;
-  int boxes = 0;                ///< that have a mesh
-  Phases phases;                ///< of treepm
+  int boxes = 0;  ///< that have a mesh
+  Phases phases{};
+  GravityMethod method = GravityMethod::kDirect;  ///< that was used
+  std::string reason{};                           ///< for it; empty unless kAuto chose
   Vec3d net_force_removed{};    ///< sum(m a) that was subtracted from all accelerations [N]; zero for a pairwise sum
   double momentum_error = 0.0;  ///< |sum(m a)| / sum(m |a|) over all ranks
 };
@@ -65,10 +67,6 @@ class Solver {
   /// Of the last evaluation.
   [[nodiscard]] virtual const Stats& last() const = 0;
 };
-
-/// The method kAuto stands for: the direct sum up to some thousand particles or where the error asked for is below what
-/// the tree can do, else the tree.
-GravityMethod cheapest_method(std::uint64_t all_particles, double error);
 
 /// The solver for `method`; kAuto chooses anew at each evaluation. Throws UsageError for kOff, for methods this program
 /// lacks, for a softening that is negative or not finite and for an error or opening that is not positive.

@@ -5,14 +5,19 @@
 #include <unordered_map>
 
 namespace breccia::gravity {
+
+double mesh_nodes(const Box& box, double cell) {
+  const MeshSize size = MeshGeometry(box, cell).size;
+  return 1.0 * size.nodes[0] * size.nodes[1] * size.nodes[2];
+}
+
 namespace {
 
-// Blocks of space are this many mean distances wide, 64 particles where it is full, and dense from 8 on.
+// Blocks of space are this many mean distances wide, 64 particles where it is full. What has swelled much beyond that
+// would have its neighbours beyond the reach of the pairs.
 constexpr double kBlockWidth = 4.0;
-constexpr std::int64_t kDenseCount = 8;
+constexpr std::int64_t kDenseCount = 24;
 
-constexpr double kLeastMassFraction = 0.1;
-constexpr std::int64_t kLeastParticles = 1000;
 constexpr double kLeastParticlesPerNode = 0.05;
 
 // One mesh over two boxes may have this many times the nodes of two meshes: it saves the tree between them.
@@ -127,11 +132,6 @@ Region flood(const Blocks& blocks, std::size_t start, std::vector<bool>& seen) {
   return {sum.bounds, sum.mass, sum.count};
 }
 
-double nodes_of(const Box& box, double cell) {
-  const MeshSize size = MeshGeometry(box, cell).size;
-  return 1.0 * size.nodes[0] * size.nodes[1] * size.nodes[2];
-}
-
 Region merged(const Region& a, const Region& b) {
   Block sum{};
   sum.add(a.count, a.mass, a.box);
@@ -149,14 +149,35 @@ bool merge_one_pair(std::vector<Region>& regions, double cell) {
   for (std::size_t i = 0; i < regions.size(); ++i) {
     for (std::size_t j = i + 1; j < regions.size(); ++j) {
       const Region both = merged(regions[i], regions[j]);
-      const double apart = nodes_of(regions[i].box, cell) + nodes_of(regions[j].box, cell);
-      if (!overlap(regions[i].box, regions[j].box) && nodes_of(both.box, cell) > kMergeCost * apart) continue;
+      const double apart = mesh_nodes(regions[i].box, cell) + mesh_nodes(regions[j].box, cell);
+      if (!overlap(regions[i].box, regions[j].box) && mesh_nodes(both.box, cell) > kMergeCost * apart) continue;
       regions[i] = both;
       regions.erase(regions.begin() + static_cast<std::ptrdiff_t>(j));
       return true;
     }
   }
   return false;
+}
+
+// Of the particles in the emptier blocks, so that these hold `fraction` of them all, the last one's block's count.
+std::int64_t count_at(const std::vector<std::int64_t>& sorted, double fraction) {
+  std::int64_t all = 0;
+  for (const std::int64_t count : sorted) all += count;
+  std::int64_t before = 0;
+  for (const std::int64_t count : sorted) {
+    before += count;
+    if (static_cast<double>(before) >= fraction * static_cast<double>(all)) return count;
+  }
+  return 0;
+}
+
+// How many particles share the block of the median one, without debris: blocks far emptier than those of the most
+// crowded tenth, as a body of a tenth of the mass may get a box whatever there is around it.
+std::int64_t median_dense_count(std::vector<std::int64_t> counts) {
+  std::sort(counts.begin(), counts.end());
+  const std::int64_t least = count_at(counts, 1.0 - kLeastBoxMass) / 8;
+  counts.erase(counts.begin(), std::lower_bound(counts.begin(), counts.end(), least));
+  return count_at(counts, 0.5);
 }
 
 }  // namespace
@@ -171,8 +192,8 @@ std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double ce
   for (std::size_t i = 0; i < seen.size(); ++i) {
     if (seen[i] || blocks.all()[i].count < kDenseCount) continue;
     const Region region = flood(blocks, i, seen);
-    if (region.count < kLeastParticles || region.mass < kLeastMassFraction * total) continue;
-    if (static_cast<double>(region.count) < kLeastParticlesPerNode * nodes_of(region.box, cell)) continue;
+    if (region.count < kLeastBoxParticles || region.mass < kLeastBoxMass * total) continue;
+    if (static_cast<double>(region.count) < kLeastParticlesPerNode * mesh_nodes(region.box, cell)) continue;
     regions.push_back(region);
   }
   // Ties are broken by place, so that the order does not depend on that of the particles.
@@ -188,7 +209,7 @@ std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double ce
 }
 
 double dense_spacing(ParticlesView particles, const mpi::Comm& comm) {
-  // Between 16 and 128 particles in the median particle's block; the width is halved or doubled towards that.
+  // Between 16 and 128 particles in the median dense particle's block; the width is narrowed towards that.
   constexpr std::int64_t kFewest = 16;
   constexpr std::int64_t kMost = 128;
   Block own{};
@@ -204,14 +225,11 @@ double dense_spacing(ParticlesView particles, const mpi::Comm& comm) {
     std::vector<std::int64_t> counts;
     const Blocks blocks = count_blocks(particles, width, comm);
     for (const Block& b : blocks.all()) counts.push_back(b.count);
-    std::sort(counts.begin(), counts.end());
-    std::int64_t before = 0;
-    std::size_t k = 0;
-    while (2 * (before + counts[k]) < all.count) before += counts[k++];
-    const double spacing = width / std::cbrt(static_cast<double>(counts[k]));
-    if (counts[k] <= kMost || halvings == 40) return spacing;
+    const std::int64_t count = median_dense_count(counts);
+    const double spacing = width / std::cbrt(static_cast<double>(count));
+    if (count <= kMost || halvings == 40) return spacing;
     // Never below the fewest: a third of the width has at least a 27th of the particles where they are even.
-    width *= std::max(0.5, std::cbrt(static_cast<double>(kFewest) / static_cast<double>(counts[k])));
+    width *= std::max(0.5, std::cbrt(static_cast<double>(kFewest) / static_cast<double>(count)));
   }
 }
 

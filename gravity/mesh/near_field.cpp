@@ -30,7 +30,7 @@ double NearField<Real>::add_field(const Clusters<Real>& own, std::span<const Vec
                                   std::span<const double> mass, double spacing, const ShortRange<Real>& law,
                                   bool with_potential, SlotField<Real>& field, Phases& phases) {
   double pairs = 0.0;
-  phases.time(Phase::kNear, [&] {
+  phases.time(Phase::kPairs, [&] {
     if (comm_.size() > 1)
       fetch_halo(position, mass, std::sqrt(static_cast<double>(law.cutoff_squared)), spacing, phases);
     pairs = add_from(own, own, law, with_potential, field);

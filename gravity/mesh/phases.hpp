@@ -7,20 +7,24 @@
 
 namespace breccia::gravity {
 
-enum class Phase { kBoxes, kSort, kAssign, kTransform, kInterpolate, kNear, kUnsplit, kCount };
+/// kSort is all that grows with the particles alone: sorting, clusters, trees and their moments where one tree holds
+/// everything. kPairs is the near field or the direct sum, kTree the walk and the trees of several sets.
+enum class Phase { kBoxes, kSort, kAssign, kTransform, kInterpolate, kPairs, kTree, kCount };
 inline constexpr int kPhases = static_cast<int>(Phase::kCount);
-inline constexpr std::array<const char*, kPhases> kPhaseNames{"boxes",       "sort",       "assign", "transform",
-                                                              "interpolate", "near field", "tree"};
+inline constexpr std::array<const char*, kPhases> kPhaseNames{"boxes",       "sort",  "assign", "transform",
+                                                              "interpolate", "pairs", "tree"};
 
 struct Phases {
   std::array<double, kPhases> seconds{};
   double bytes_sent = 0.0;
 
+  [[nodiscard]] double& operator[](Phase phase) { return seconds[static_cast<std::size_t>(phase)]; }
+
   template <class F>
   void time(Phase phase, F&& work) {
     const double start = MPI_Wtime();
     work();
-    seconds[static_cast<std::size_t>(phase)] += MPI_Wtime() - start;
+    (*this)[phase] += MPI_Wtime() - start;
   }
 };
 

@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "gravity/mesh/box_field.hpp"
-#include "gravity/mesh/boxes.hpp"
+#include "gravity/mesh/layout.hpp"
 #include "gravity/mesh/unsplit.hpp"
 #include "gravity/solver.hpp"
 
@@ -17,19 +17,16 @@ class TreePm final : public Solver {
   TreePm(const Parameters& parameters, const mpi::Comm& comm, int threads);
 
   void evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) override;
+  /// The same with boxes already chosen by lay_boxes().
+  void evaluate_in(const Layout& layout, ParticlesView particles, std::span<Vec3d> acceleration,
+                   std::span<double> potential);
   [[nodiscard]] const Stats& last() const override { return stats_; }
 
  private:
-  void choose(ParticlesView particles);
-
   Parameters parameters_;
   mpi::Comm comm_;
   int threads_;
   Stats stats_;
-  double spacing_ = 0.0;  // mean distance of the particles where they are dense [m]
-  double cell_ = 0.0;     // [m]
-  std::vector<Box> boxes_;
-  std::vector<std::uint8_t> set_;  // of each particle: 0 outside, k in box k - 1
   std::vector<BoxField<Real>> fields_;
   UnsplitField unsplit_;
 };

@@ -38,27 +38,18 @@ TreeSolver::TreeSolver(const Parameters& parameters, const mpi::Comm& comm, int 
 
 void TreeSolver::evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) {
   check_sizes(particles, acceleration, potential);
-  stats_ = {};
+  stats_ = {.method = GravityMethod::kTree};
   const Stopwatch whole(stats_.seconds);
   const double mass_unit = heaviest(particles.mass, comm_);
   const Root root = common_root(particles, comm_);
   const double softening = parameters_.softening / root.unit;
-  {
-    const Stopwatch watch(stats_.build_seconds);
+  stats_.phases.time(Phase::kSort, [&] {
     build(root, particles, mass_unit);
     take_share();
-  }
+  });
   const bool with_potential = comm_.any(!potential.empty());
   sums_.reset(tree_.particles.size(), with_potential);
-  const std::vector<double> scales = acceleration_scales(tree_, softening, threads_, comm_);
-  const WalkSettings settings{opening_for(parameters_), softening, threads_};
-  const InteractionCounts counts = parameters_.precision == Precision::kMixed
-                                       ? walk<float>(tree_, scales, tree_, settings, sums_)
-                                       : walk<double>(tree_, scales, tree_, settings, sums_);
-  stats_.pairs = counts.pairs;
-  stats_.cell_interactions = counts.cells;
-  stats_.expansions = counts.expansions;
-  share_sums();
+  stats_.phases.time(Phase::kTree, [&] { walk_share(softening); });
   const auto first = static_cast<std::int64_t>(comm_.exclusive_scan(particles.position.size()));
   write(first, kGravitationalConstant * mass_unit, root.unit, acceleration, potential);
   remove_net_force(particles, acceleration, comm_, stats_);
@@ -91,6 +82,18 @@ void TreeSolver::take_share() {
   }
   share_ = whole_groups;
   for (Cell& cell : tree_.cells) cell.is_target = cell.begin < share_.end && cell.end > share_.begin;
+}
+
+void TreeSolver::walk_share(double softening) {
+  const std::vector<double> scales = acceleration_scales(tree_, softening, threads_, comm_);
+  const WalkSettings settings{opening_for(parameters_), softening, threads_};
+  const InteractionCounts counts = parameters_.precision == Precision::kMixed
+                                       ? walk<float>(tree_, scales, tree_, settings, sums_)
+                                       : walk<double>(tree_, scales, tree_, settings, sums_);
+  stats_.pairs = counts.pairs;
+  stats_.cell_interactions = counts.cells;
+  stats_.expansions = counts.expansions;
+  share_sums();
 }
 
 // The shares follow each other in rank order.

@@ -25,6 +25,7 @@ class TreeSolver final : public Solver {
  private:
   void build(const Root& root, ParticlesView particles, double mass_unit);
   void take_share();
+  void walk_share(double softening);
   void share_sums();
   void write(std::int64_t first, double unit, double length, std::span<Vec3d> acceleration,
              std::span<double> potential) const;

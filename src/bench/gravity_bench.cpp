@@ -142,12 +142,11 @@ std::vector<Setting> settings(const GravityBenchOptions& options, double softeni
     const gravity::Parameters p{.softening = softening, .opening = opening};
     list.push_back({"tree", fmt::format("opening {:.1e}", opening), GravityMethod::kTree, p});
   }
-  for (const double error : {gravity::Parameters{}.error, 1e-4}) {
-    gravity::Parameters p;
-    p.softening = softening;
-    p.error = error;
+  for (const double error : {1e-3, 3.5e-4, 1e-4}) {
+    const gravity::Parameters p{.softening = softening, .error = error};
     list.push_back({"treepm", fmt::format("error {:.1e}", error), GravityMethod::kTreePm, p});
   }
+  list.push_back({"auto", "default", GravityMethod::kAuto, {.softening = softening}});
   return list;
 }
 
@@ -179,6 +178,9 @@ void run_gravity_bench(const GravityBenchOptions& options) {
                                    {"direct_seconds", m.direct},    {"ratio_to_direct", m.direct / m.seconds},
                                    {"rms", m.errors.rms},           {"p99", m.errors.p99},
                                    {"max", m.errors.max},           {"net_momentum", m.stats.momentum_error}};
+        for (std::size_t k = 0; k < m.stats.phases.seconds.size(); ++k) {
+          row["phases"][gravity::kPhaseNames[k]] = m.stats.phases.seconds[k];
+        }
         row["body_momentum"] = m.body_momentum ? nlohmann::ordered_json(*m.body_momentum) : nullptr;
         results.push_back(row);
       }

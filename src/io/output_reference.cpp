@@ -45,7 +45,9 @@ newest `output.keep` stay. They are read by the version that wrote them, on any 
 Written at the end: `particles`, `steps`, `simulated_time` [s], `time_step` (the last) [s], `wall_seconds`, `ranks`, `threads`, `device`, `precision`,
 `particle_steps_per_second`; `conservation` with the drifts of `mass` (over the total mass), `momentum` (over sum m |v|),
 `angular_momentum` (over sum m |x cross v|) and `energy` (over max(kinetic + |potential|)); `damaged_fraction`; `remnants`,
-largest first; `stages` with the wall time of each stage of the step; `versions`; `machine`; `scene`, every key as resolved;
+largest first; `stages` with the wall time of each stage of the step on the first rank, parts of gravity as `gravity: part` and also
+in `gravity`; `gravity` with `evaluations` of each method, `reason` and `boxes` of the last one, `pairs`,
+`cell_interactions`, `expansions`, `bytes_sent` of all ranks and `net_force`, the largest over sum m |a|; `versions`; `machine`; `scene`, every key as resolved;
 `used` and `unused`, the keys of the scene that had and had not an effect.
 )";
 

@@ -77,6 +77,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["damaged_fraction"] = summary.damaged_fraction;
   json["remnants"] = summary.remnants;
   json["stages"] = stages_json(summary.stages);
+  json["gravity"] = summary.gravity;
   json["versions"] = versions_json();
   json["machine"] = machine_json();
   json["scene"] = scene_json(summary.scene);

@@ -42,6 +42,7 @@ struct RunSummary {
   double damaged_fraction = 0.0;                      ///< mass-weighted mean of D
   nlohmann::json remnants = nlohmann::json::array();  ///< largest first (remnants_json.hpp)
   std::vector<StageTiming> stages;
+  nlohmann::json gravity;                ///< what its evaluations came to; null without self-gravity
   std::vector<ResolvedKey> scene;        ///< every key as resolved
   std::vector<std::string> unused_keys;  ///< keys that had no effect in this run
 };

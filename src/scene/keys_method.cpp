@@ -16,7 +16,7 @@ std::vector<Key> effects() {
        {"off", "direct", "tree", "treepm", "auto"},
        "",
        "",
-       "self-gravity: sum over pairs, tree, or particle mesh; auto takes the direct sum or the tree, none if "
+       "self-gravity: sum over pairs, tree, or particle mesh; auto takes the cheapest, none if "
        "G M/(R c0^2) < 1e-9",
        [](Draft& d, std::size_t) { return choice(d.scene.effects.gravity); }},
       {"effects.shear", kPure, kAny, kSwitch, "", "", "shear stress; off leaves pressure only; auto: on unless mu = 0",

@@ -4,7 +4,8 @@
 #include <chrono>
 #include <cmath>
 
-#include "gravity/solver.hpp"
+#include "gravity/mesh/boxes.hpp"
+#include "gravity/method.hpp"
 #include "scene/bodies.hpp"
 #include "sim/setup.hpp"
 #include "sim/step_size.hpp"
@@ -47,28 +48,32 @@ std::uint64_t count_particles(const Scene& scene) {
   return total;
 }
 
-// What the scene's method comes down to for its number of particles.
-GravityMethod gravity_method(const Scene& scene, const ResolvedEffects& effects) {
-  if (!effects.gravity) return GravityMethod::kOff;
-  return effects.gravity_method == GravityMethod::kAuto
-             ? gravity::cheapest_method(count_particles(scene), scene.gravity.error)
-             : effects.gravity_method;
-}
-
-const char* name_of(GravityMethod method) {
-  switch (method) {
-    case GravityMethod::kOff:
-      return "off";
-    case GravityMethod::kTree:
-      return "tree";
-    case GravityMethod::kTreePm:
-      return "treepm";
-    default:
-      return "direct";
+// The matter as it starts: each body dense and by itself, those that the mesh would not care for outside.
+gravity::Matter matter_at_start(const Scene& scene) {
+  double mass = 0.0;
+  for (const BodyParameters& b : scene.bodies) mass += b.mass;
+  const double spacing = mean_spacing(scene);
+  const double cell = scene.gravity.mesh > 0.0 ? scene.gravity.mesh : gravity::kCellsPerSpacing * spacing;
+  gravity::Matter matter{.particles = count_particles(scene)};
+  for (const BodyParameters& b : scene.bodies) {
+    if (static_cast<std::int64_t>(b.particles) < gravity::kLeastBoxParticles || b.mass < gravity::kLeastBoxMass * mass)
+      continue;
+    matter.in_boxes += b.particles;
+    matter.mesh_nodes += gravity::mesh_nodes({b.position - b.semi_axes, b.position + b.semi_axes}, cell);
+    ++matter.boxes;
   }
+  return matter;
 }
 
-// One evaluation, from a sample of evenly spread points: the direct sum grows with the square of their number.
+// What the scene's method comes down to when it starts.
+gravity::MethodChoice gravity_method(const Scene& scene, const ResolvedEffects& effects) {
+  if (!effects.gravity) return {GravityMethod::kOff, ""};
+  if (effects.gravity_method != GravityMethod::kAuto) return {effects.gravity_method, ""};
+  return gravity::cheapest_method(matter_at_start(scene), scene.gravity.error);
+}
+
+// One evaluation, from a sample of evenly spread points: the direct sum grows with the square of their number N, tree
+// and mesh with N log N.
 double gravity_seconds(const Scene& scene, GravityMethod method, const mpi::Comm& self) {
   constexpr std::size_t kSample = 16'384;
   std::vector<Vec3d> x(kSample);
@@ -80,13 +85,15 @@ double gravity_seconds(const Scene& scene, GravityMethod method, const mpi::Comm
   std::vector<Vec3d> acceleration(kSample);
   const gravity::Parameters parameters{.softening = 1e-3,
                                        .precision = scene.numerics.precision,
+                                       .mesh = {.split = scene.gravity.split},
                                        .error = scene.gravity.error,
                                        .opening = scene.gravity.opening};
   const auto solver = gravity::make_solver(method, parameters, self, 1);
   solver->evaluate({x, m}, acceleration, {});
   const double sample = seconds_of([&] { solver->evaluate({x, m}, acceleration, {}); });
-  const double ratio = static_cast<double>(count_particles(scene)) / static_cast<double>(kSample);
-  return sample * (method == GravityMethod::kDirect ? ratio * ratio : ratio);
+  const double all = std::max(2.0, static_cast<double>(count_particles(scene)));
+  const double ratio = all / static_cast<double>(kSample);
+  return sample * ratio * (method == GravityMethod::kDirect ? ratio : std::log(all) / std::log(1.0 * kSample));
 }
 
 }  // namespace
@@ -95,8 +102,11 @@ Plan make_plan(const Scene& scene) {
   const ResolvedEffects effects = resolve_effects(scene);
   Plan plan;
   plan.effects = effects.decisions;
-  const GravityMethod method = gravity_method(scene, effects);
-  plan.gravity_method = name_of(method);
+  const gravity::MethodChoice choice = gravity_method(scene, effects);
+  plan.gravity_method = gravity::name_of(choice.method);
+  for (EffectDecision& effect : plan.effects) {
+    if (effect.name == "gravity" && !choice.reason.empty()) effect.reason += "; at the start " + choice.reason;
+  }
   const StepSize step = stable_step(scene, initial_speeds(scene, effects.material.shear), effects.material.viscosity);
   plan.time_step = step.seconds;
   plan.time_step_limited_by = step.limited_by;
@@ -123,7 +133,8 @@ double calibrate(const Scene& scene) {
                      for (int i = 0; i < kSteps; ++i) one_step();
                    }) /
                    kSteps * scale;
-  if (effects.gravity) seconds += gravity_seconds(scene, gravity_method(scene, effects), self) / scene.gravity.interval;
+  if (effects.gravity)
+    seconds += gravity_seconds(scene, gravity_method(scene, effects).method, self) / scene.gravity.interval;
   return seconds;
 }
 

@@ -11,7 +11,7 @@ namespace breccia::sim {
 
 struct Plan {
   std::vector<EffectDecision> effects;
-  std::string gravity_method;        ///< "direct", or "off"
+  std::string gravity_method;        ///< "direct", "tree", "treepm" or "off"; with auto what it starts with
   double time_step = 0.0;            ///< first step [s]
   std::string time_step_limited_by;  ///< "fixed by the scene", "acoustic with viscosity", "speed"
   std::uint64_t particles = 0;

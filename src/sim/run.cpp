@@ -160,11 +160,12 @@ class Output {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-void print_profile(const StageTimers& timers, double wall) {
+void print_profile(const StageTimers& timers, const GravityRecord& gravity, double wall) {
   fmt::print("{:<20} {:>10} {:>7} {:>10}\n", "stage", "seconds", "%", "calls");
   for (const StageTimers::Stage& s : timers.stages()) {
     fmt::print("{:<20} {:>10.3f} {:>7.1f} {:>10}\n", s.name, s.seconds, 100.0 * s.seconds / wall, s.calls);
   }
+  if (!gravity.decision().empty()) fmt::print("gravity at the end: {}\n", gravity.decision());
 }
 
 std::filesystem::path default_folder(const Scene& scene) { return std::filesystem::path("out") / scene.name; }
@@ -310,12 +311,13 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   summary.time_step = loop.dt();
   summary.wall_seconds = wall_before + wall;
   for (const StageTimers::Stage& s : loop.timers().stages()) {
-    summary.stages.push_back({std::string(s.name), s.seconds, s.calls});
+    summary.stages.push_back({s.name, s.seconds, s.calls});
     if (s.name == "output" || s.name == "checkpoint") summary.wall_seconds -= s.seconds;
   }
+  summary.gravity = loop.gravity_record().summary(comm);
   summary.scene = options.resolved;
   io::write_summary(options.out / "summary.json", summary, comm);
-  if (options.profile && comm.is_root()) print_profile(loop.timers(), wall);
+  if (options.profile && comm.is_root()) print_profile(loop.timers(), loop.gravity_record(), wall);
 }
 
 }  // namespace breccia::sim

@@ -89,4 +89,14 @@ double bytes_per_particle(const Scene& scene, const ResolvedEffects& effects) {
   return bytes + (mixed ? 36.0 : 72.0);
 }
 
+double mean_spacing(const Scene& scene) {
+  double volume = 0.0;
+  double particles = 0.0;
+  for (const BodyParameters& b : scene.bodies) {
+    volume += b.mass / scene.materials[b.material].eos.rho0;
+    particles += static_cast<double>(b.particles);
+  }
+  return particles > 0.0 ? std::cbrt(volume / particles) : 0.0;
+}
+
 }  // namespace breccia::sim

@@ -20,6 +20,9 @@ std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const Resol
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
                                                  const ParticleArrays& particles, int threads, const mpi::Comm& comm);
 
+/// Mean distance of the particles in all bodies as they are made [m]: a restarted run finds the same.
+double mean_spacing(const Scene& scene);
+
 /// Bytes of all fields of a particle, flaw thresholds (mean number) and sorting included, without the grid.
 double bytes_per_particle(const Scene& scene, const ResolvedEffects& effects);
 

@@ -3,6 +3,7 @@
 
 #include <chrono>
 #include <cstdint>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -11,16 +12,23 @@ namespace breccia::sim {
 class StageTimers {
  public:
   struct Stage {
-    std::string_view name;
+    std::string name;  ///< "whole: part" for a part of the stage "whole"
     double seconds = 0.0;
     std::uint64_t calls = 0;
   };
 
-  /// Runs `work` and books its time under `name` (a string literal).
+  /// Runs `work` and books its time under `name`.
   template <class F>
   decltype(auto) operator()(std::string_view name, F&& work) {
     const Running running(stage(name));
     return work();
+  }
+
+  /// Books a part of a stage that is measured elsewhere, as "whole: part". Its time is in that of the whole, too.
+  void add_part(std::string_view whole, std::string_view part, double seconds) {
+    Stage& s = stage(std::string(whole) + ": " + std::string(part));
+    s.seconds += seconds;
+    ++s.calls;
   }
 
   [[nodiscard]] const std::vector<Stage>& stages() const { return stages_; }
@@ -49,7 +57,7 @@ class StageTimers {
       if (s.name == name) return s;
     }
     // Stages do not nest, so a reference is never held across this.
-    return stages_.emplace_back(Stage{name});
+    return stages_.emplace_back(Stage{std::string(name)});
   }
 
   std::vector<Stage> stages_;

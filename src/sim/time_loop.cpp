@@ -7,20 +7,6 @@
 #include "sim/setup.hpp"
 
 namespace breccia::sim {
-namespace {
-
-// Mean distance of the particles in all bodies, as they were made: a restarted run must find the same [m].
-double mean_spacing(const Scene& scene) {
-  double volume = 0.0;
-  double particles = 0.0;
-  for (const BodyParameters& b : scene.bodies) {
-    volume += b.mass / scene.materials[b.material].eos.rho0;
-    particles += static_cast<double>(b.particles);
-  }
-  return particles > 0.0 ? std::cbrt(volume / particles) : 0.0;
-}
-
-}  // namespace
 
 TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm)
     : scene_(scene),
@@ -139,6 +125,11 @@ void TimeLoop::evaluate_gravity() {
     solver_->evaluate({position, mass}, acceleration, {});
     engine_->hold_gravity(acceleration);
   });
+  const gravity::Phases& phases = solver_->last().phases;
+  for (std::size_t k = 0; k < phases.seconds.size(); ++k) {
+    if (phases.seconds[k] > 0.0) timers_.add_part("gravity", gravity::kPhaseNames[k], phases.seconds[k]);
+  }
+  gravity_record_.add(solver_->last());
 }
 
 void TimeLoop::book_pass() {

@@ -9,6 +9,7 @@
 #include "grid/engine.hpp"
 #include "sim/diagnostics.hpp"
 #include "sim/effects.hpp"
+#include "sim/gravity_record.hpp"
 #include "sim/stage_timers.hpp"
 #include "sim/step_size.hpp"
 
@@ -41,6 +42,7 @@ class TimeLoop {
   [[nodiscard]] const grid::Engine& engine() const { return *engine_; }
   [[nodiscard]] gravity::Solver* solver() const { return solver_.get(); }
   [[nodiscard]] const LostWork& lost_work() const { return lost_; }
+  [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
 
  private:
@@ -61,6 +63,7 @@ class TimeLoop {
   std::unique_ptr<grid::Engine> engine_;
   std::unique_ptr<gravity::Solver> solver_;  // null: no self-gravity
   gravity::Window window_;
+  GravityRecord gravity_record_;
   LostWork lost_;
   double time_ = 0.0;
   double dt_ = 0.0;           // of the step that comes

@@ -50,6 +50,22 @@ class Run(CommandTest):
         self.assertEqual(process.returncode, 0, process.stderr)
         self.assertIn("stage", process.stdout)
 
+    def test_parts_of_gravity_are_in_profile_and_summary(self):
+        for ranks in (1, 2):
+            out = self.folder / f"gravity{ranks}"
+            process = breccia(
+                "run", self.write_scene(), "--out", out, "--steps", 2, "--profile", "--set", "effects.gravity=tree",
+                ranks=ranks,
+            )
+            self.assertEqual(process.returncode, 0, process.stderr)
+            self.assertIn("gravity: tree", process.stdout)
+            self.assertIn("gravity at the end: tree, the scene says so", process.stdout)
+            summary = json.loads((out / "summary.json").read_text())
+            self.assertEqual(summary["gravity"]["evaluations"], {"tree": 1})
+            self.assertGreater(summary["gravity"]["pairs"] + summary["gravity"]["cell_interactions"], 0)
+            stages = {stage["stage"]: stage["seconds"] for stage in summary["stages"]}
+            self.assertLessEqual(stages["gravity: sort"] + stages["gravity: tree"], stages["gravity"])
+
     def test_default_folder_is_named_after_the_scene(self):
         process = breccia("run", self.write_scene(), "--steps", 1, cwd=self.folder)
         self.assertEqual(process.returncode, 0, process.stderr)

@@ -59,4 +59,21 @@ inline void add_ball(Cloud& cloud, std::size_t count, Vec3d centre, double radiu
   }
 }
 
+/// A ball of a jittered cubic lattice: rock, in which particles keep their distance.
+inline void add_rock(Cloud& cloud, std::size_t about, Vec3d centre, double radius, std::mt19937_64& random) {
+  const double h = radius * std::cbrt(4.0 / 3.0 * kPi / static_cast<double>(about));
+  std::uniform_real_distribution<double> jitter(-0.2, 0.2);
+  const int reach = static_cast<int>(radius / h) + 1;
+  for (int i = -reach; i <= reach; ++i) {
+    for (int j = -reach; j <= reach; ++j) {
+      for (int k = -reach; k <= reach; ++k) {
+        const Vec3d p{h * (i + jitter(random)), h * (j + jitter(random)), h * (k + jitter(random))};
+        if (dot(p, p) > radius * radius) continue;
+        cloud.position.push_back(centre + p);
+        cloud.mass.push_back(3e13);
+      }
+    }
+  }
+}
+
 }  // namespace breccia::gravity

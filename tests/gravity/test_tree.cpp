@@ -169,19 +169,6 @@ TEST(TreeSolver, FewAndDegenerateParticles) {
   EXPECT_LT(rms_of_ratios(tree(tracers, with_opening(0.0)).field.acceleration, plain.acceleration), 1e-3);
 }
 
-TEST(AutoSolver, SumsFewParticlesDirectlyAndManyByTree) {
-  EXPECT_EQ(cheapest_method(1000, 3.5e-4), GravityMethod::kDirect);
-  EXPECT_EQ(cheapest_method(1'000'000, 3.5e-4), GravityMethod::kTree);
-  EXPECT_EQ(cheapest_method(1'000'000, 1e-8), GravityMethod::kDirect);
-  const mpi::Comm comm;
-  const Cloud cloud = two_spheres(5000);
-  const Parameters parameters{.softening = kSoftening};
-  const Result few = evaluate(GravityMethod::kAuto, two_spheres(1000), parameters, round_robin());
-  EXPECT_EQ(comm.sum(few.stats.pairs), 1000.0 * 1000.0);
-  EXPECT_LT(comm.sum(evaluate(GravityMethod::kAuto, cloud, parameters, round_robin()).stats.pairs),
-            0.9 * 5000.0 * 5000.0);
-}
-
 TEST(Verify, FindsAnErrorThatIsThere) {
   const Cloud cloud = two_spheres(2000);
   const mpi::Comm self(MPI_COMM_SELF);

@@ -25,23 +25,6 @@ Owner slabs(const Cloud& cloud, double width) {
   };
 }
 
-// A ball of a jittered cubic lattice: rock, in which particles keep their distance.
-void add_rock(Cloud& cloud, std::size_t about, Vec3d centre, double radius, std::mt19937_64& random) {
-  const double h = radius * std::cbrt(4.0 / 3.0 * kPi / static_cast<double>(about));
-  std::uniform_real_distribution<double> jitter(-0.2, 0.2);
-  const int reach = static_cast<int>(radius / h) + 1;
-  for (int i = -reach; i <= reach; ++i) {
-    for (int j = -reach; j <= reach; ++j) {
-      for (int k = -reach; k <= reach; ++k) {
-        const Vec3d p{h * (i + jitter(random)), h * (j + jitter(random)), h * (k + jitter(random))};
-        if (dot(p, p) > radius * radius) continue;
-        cloud.position.push_back(centre + p);
-        cloud.mass.push_back(3e13);
-      }
-    }
-  }
-}
-
 Cloud two_bodies(std::size_t each, Vec3d shift = {}) {
   Cloud cloud;
   std::mt19937_64 random(7);

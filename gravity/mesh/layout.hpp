@@ -1,0 +1,25 @@
+// The boxes of an evaluation and the particles in them.
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "gravity/mesh/boxes.hpp"
+#include "gravity/method.hpp"
+
+namespace breccia::gravity {
+
+struct Layout {
+  double spacing = 0.0;  ///< mean distance of the particles where they are dense [m]
+  double cell = 0.0;     ///< of the meshes [m]
+  std::vector<Box> boxes;
+  std::vector<std::uint8_t> set;  ///< of each particle: 0 outside, k in box k - 1
+};
+
+/// Chooses boxes and deals the particles out to them; a spacing of 0 is found from the particles. Collective.
+Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi::Comm& comm);
+
+/// What the choice of a method needs to know. Collective.
+Matter matter_of(const Layout& layout, const mpi::Comm& comm);
+
+}  // namespace breccia::gravity
