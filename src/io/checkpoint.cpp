@@ -25,7 +25,7 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr std::int64_t kFormat = 1;
-constexpr std::string_view kPrefix = "chk_";
+constexpr std::string_view kPrefix = "checkpoint_";
 constexpr std::string_view kSuffix = ".h5";
 
 // Numbers are stored by their bits: what comes back is what was there.

@@ -16,7 +16,7 @@ struct Checkpoint {
   std::string run;     ///< everything else, JSON
 };
 
-/// "chk_0007.h5"
+/// "checkpoint_0007.h5"
 std::string checkpoint_name(std::uint64_t number);
 
 /// Numbers of the checkpoints in `folder`, newest first; none if there is no such folder. Collective.

@@ -33,7 +33,7 @@ One line per output step. The first line names the columns with their units; num
 double precision value back exactly.
 
 {diagnostics}
-## `chk_NNNN.h5`
+## `checkpoint_NNNN.h5`
 
 A checkpoint: everything a run needs to go on, bit for bit, in parallel HDF5 with a CRC-32 of the whole file behind its end.
 `/Particles` has the fields of the engine by their bits, in storage order; `/FlawThresholds` the strains at which flaws

@@ -25,7 +25,7 @@ def rows(folder):
 
 
 def checkpoints(folder):
-    return sorted(path.name for path in folder.glob("chk_*"))
+    return sorted(path.name for path in folder.glob("checkpoint_*"))
 
 
 class Restart(CommandTest):
@@ -126,7 +126,7 @@ class Restart(CommandTest):
 
     def test_newest_stay(self):
         self.run_scene("out", "--steps", 60)
-        self.assertEqual(checkpoints(self.folder / "out"), ["chk_0005.h5", "chk_0006.h5"])
+        self.assertEqual(checkpoints(self.folder / "out"), ["checkpoint_0005.h5", "checkpoint_0006.h5"])
         self.run_scene("three", "--steps", 60, "--set", "output.keep=3", "--set", "output.checkpoint_time=off")
         self.assertEqual(checkpoints(self.folder / "three"), [])
 
@@ -135,32 +135,32 @@ class Restart(CommandTest):
             out = f"out{ranks}"
             self.run_scene("whole", "--restart", "auto", "--until", "20 s")
             self.run_scene(out, "--steps", 60)
-            newest = self.folder / out / "chk_0006.h5"
+            newest = self.folder / out / "checkpoint_0006.h5"
             intact = newest.read_bytes()
-            before = self.folder / out / "chk_0005.h5"
+            before = self.folder / out / "checkpoint_0005.h5"
             older = before.read_bytes()
             flipped = bytearray(intact)
             flipped[len(intact) // 2] ^= 1
             for damaged, word in ((bytes(flipped), "checksum"), (intact[:-1000], "truncated"), (b"", "truncated")):
-                for path in (self.folder / out).glob("chk_*"):
+                for path in (self.folder / out).glob("checkpoint_*"):
                     path.unlink()
                 newest.write_bytes(damaged)
                 before.write_bytes(older)
                 process = self.run_scene(out, "--restart", "auto", "--steps", 61, ranks=ranks)
-                for text in ("warning", "chk_0006.h5", word, "chk_0005.h5"):
+                for text in ("warning", "checkpoint_0006.h5", word, "checkpoint_0005.h5"):
                     self.assertIn(text, process.stderr)
                 # What comes next takes the number of the damaged one.
-                self.assertEqual(checkpoints(self.folder / out), ["chk_0005.h5", "chk_0006.h5"])
+                self.assertEqual(checkpoints(self.folder / out), ["checkpoint_0005.h5", "checkpoint_0006.h5"])
                 newest.write_bytes(damaged)
                 self.assert_fails(
                     breccia("run", self.scene, "--out", self.folder / out, "--restart", newest, ranks=ranks),
-                    4, "chk_0006.h5", word,
+                    4, "checkpoint_0006.h5", word,
                 )
                 (self.folder / out / "summary.json").unlink()
-            (self.folder / out / "chk_0005.h5").write_bytes(b"nothing")
+            (self.folder / out / "checkpoint_0005.h5").write_bytes(b"nothing")
             self.assert_fails(
                 breccia("run", self.scene, "--out", self.folder / out, "--restart", "auto", ranks=ranks),
-                4, "chk_0006.h5", "chk_0005.h5",
+                4, "checkpoint_0006.h5", "checkpoint_0005.h5",
             )
 
     def test_changed_scene(self):
