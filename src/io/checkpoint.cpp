@@ -15,7 +15,7 @@
 #include "io/by_id.hpp"
 #include "io/checksum.hpp"
 #include "io/collectively.hpp"
-#include "io/durable_file.hpp"
+#include "io/durable_hdf5.hpp"
 #include "io/hdf5.hpp"
 
 namespace breccia::io {
@@ -210,27 +210,10 @@ void remove_other_checkpoints(const fs::path& folder, std::uint64_t newest, std:
 }
 
 void write_checkpoint(const fs::path& path, const Checkpoint& checkpoint, const mpi::Comm& comm) {
-  const fs::path temporary = temporary_name(path);
-  const std::uint64_t bytes = bytes_needed(checkpoint.engine, checkpoint.run, comm);
-  try {
-    // Twice: before HDF5 has a file open that could not be closed on a full disk, and after it emptied the file.
-    on_root(comm, [&] {
-      write_file(temporary, "");
-      reserve_space(temporary, bytes);
-    });
-    h5::File file = h5::File::create(temporary, comm);
-    on_root(comm, [&] { reserve_space(temporary, bytes); });
-    write_content(file, checkpoint, comm);
-    file.close();
-    append_checksum(temporary, comm);
-    on_root(comm, [&] { commit_file(temporary, path); });
-  } catch (const Error&) {
-    if (comm.is_root()) {
-      std::error_code ignored;
-      fs::remove(temporary, ignored);
-    }
-    throw;
-  }
+  write_durably(
+      path, bytes_needed(checkpoint.engine, checkpoint.run, comm), comm,
+      [&](h5::File& file) { write_content(file, checkpoint, comm); },
+      [&](const fs::path& temporary) { append_checksum(temporary, comm); });
 }
 
 Checkpoint read_checkpoint(const fs::path& path, const mpi::Comm& comm) {

@@ -8,7 +8,7 @@
 #include "breccia/error.hpp"
 #include "io/by_id.hpp"
 #include "io/collectively.hpp"
-#include "io/durable_file.hpp"
+#include "io/durable_hdf5.hpp"
 #include "io/fields.hpp"
 #include "io/hdf5.hpp"
 #include "io/snapshot.hpp"
@@ -159,26 +159,8 @@ void write_snapshot(const std::filesystem::path& path, const SnapshotHeader& hea
   const std::vector<const Field*> fields = fields_to_write(particles, wanted_fields, comm);
   const std::uint64_t total = comm.sum<std::uint64_t>(particles.size());
   const ById by_id(particles.id, chunk_rows_for(total), comm);
-  const std::filesystem::path temporary = temporary_name(path);
-  const std::uint64_t bytes = bytes_needed(total, fields);
-  try {
-    // Twice: before HDF5 has a file open that could not be closed on a full disk, and after it emptied the file.
-    on_root(comm, [&] {
-      write_file(temporary, "");
-      reserve_space(temporary, bytes);
-    });
-    h5::File file = h5::File::create(temporary, comm);
-    on_root(comm, [&] { reserve_space(temporary, bytes); });
-    write_file_content(file, header, particles, by_id, fields, comm);
-    file.close();
-    on_root(comm, [&] { commit_file(temporary, path); });
-  } catch (const Error&) {
-    if (comm.is_root()) {
-      std::error_code ignored;
-      std::filesystem::remove(temporary, ignored);
-    }
-    throw;
-  }
+  write_durably(path, bytes_needed(total, fields), comm,
+                [&](h5::File& file) { write_file_content(file, header, particles, by_id, fields, comm); });
 }
 
 }  // namespace breccia::io

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 #include <vector>
 
 #include "gravity/solver.hpp"
@@ -23,8 +24,7 @@ struct Result {
 };
 
 /// Deals the cloud out to the ranks, evaluates and collects the field in the order of the cloud, on all ranks.
-inline Result evaluate(GravityMethod method, const Cloud& cloud, const Parameters& parameters, const Owner& owner,
-                       int threads = 1) {
+inline Field evaluate(Solver& solver, const Cloud& cloud, const Owner& owner) {
   const mpi::Comm comm;
   Cloud mine;
   std::vector<std::size_t> index;
@@ -34,10 +34,9 @@ inline Result evaluate(GravityMethod method, const Cloud& cloud, const Parameter
     mine.position.push_back(cloud.position[i]);
     mine.mass.push_back(cloud.mass[i]);
   }
-  const auto solver = make_solver(method, parameters, comm, threads);
   std::vector<Vec3d> acceleration(index.size());
   std::vector<double> potential(index.size());
-  solver->evaluate({mine.position, mine.mass}, acceleration, potential);
+  solver.evaluate({mine.position, mine.mass}, acceleration, potential);
 
   // Every particle has one owner; the others add zeros.
   std::vector<double> all(4 * cloud.position.size(), 0.0);
@@ -46,12 +45,20 @@ inline Result evaluate(GravityMethod method, const Cloud& cloud, const Parameter
     std::copy_n(values, 4, &all[4 * index[k]]);
   }
   comm.sum(std::span<double>(all));
-  Result result{{}, solver->last()};
+  Field field;
   for (std::size_t i = 0; i < cloud.position.size(); ++i) {
-    result.field.acceleration.push_back({all[4 * i], all[4 * i + 1], all[4 * i + 2]});
-    result.field.potential.push_back(all[4 * i + 3]);
+    field.acceleration.push_back({all[4 * i], all[4 * i + 1], all[4 * i + 2]});
+    field.potential.push_back(all[4 * i + 3]);
   }
-  return result;
+  return field;
+}
+
+/// The same with a solver made for it.
+inline Result evaluate(GravityMethod method, const Cloud& cloud, const Parameters& parameters, const Owner& owner,
+                       int threads = 1) {
+  const auto solver = make_solver(method, parameters, mpi::Comm(), threads);
+  Field field = evaluate(*solver, cloud, owner);
+  return {std::move(field), solver->last()};
 }
 
 inline double largest_relative_error(const std::vector<double>& a, const std::vector<double>& b) {

@@ -150,7 +150,7 @@ TEST(Clusters, HoldEveryParticleOnceAtItsPlace) {
 // gravity.md 6.1: one mass, test particles at distances from 0.05 cells to the far end of the box.
 TEST(BoxField, PairLawInsideABox) {
   const mpi::Comm comm;
-  if (comm.size() > 1) GTEST_SKIP() << "positions are drawn on one rank";
+  if (comm.size() > 1) GTEST_SKIP() << "the law of one box; gravity_tree_pm compares the ranks";
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> unit(0.0, 1.0);
   const Box box{{0, 0, 0}, {60, 20, 20}};

@@ -6,7 +6,6 @@
 #include <type_traits>
 
 #include "deal_out.hpp"
-#include "gravity/tree/near.hpp"
 #include "gravity/tree/scales.hpp"
 #include "gravity/tree/tree.hpp"
 #include "gravity/tree/walk.hpp"
@@ -147,28 +146,6 @@ TEST(Walk, SetsWithTreesOfTheirOwnAddUp) {
   }
   EXPECT_LT(rms_error(a, exact), 3.5e-4);
   EXPECT_LT(worst, 1e-3);
-}
-
-TEST(Near, ListsEveryParticleWithinTheCutoffOnce) {
-  const Tree tree = built(two_spheres(4000));
-  const double cutoff = 8.0;
-  Workspace<float> work;
-  std::vector<std::int32_t> stack;
-  for (const std::int32_t g : tree.groups()) {
-    const Cell& group = tree.cell(g);
-    list_near(tree, group, true, cutoff, stack, work);
-    std::vector<int> listed(4000, 0);
-    for (const Range r : work.ranges) {
-      for (std::int32_t j = r.begin; j < r.end; ++j) ++listed[static_cast<std::size_t>(j)];
-    }
-    EXPECT_EQ(work.ranges.front().begin, group.begin);
-    EXPECT_EQ(*std::max_element(listed.begin(), listed.end()), 1);
-    for (std::int64_t j = 0; j < 4000; ++j) {
-      const Vec3d d = tree.particles.position(j) - tree.particles.position(group.begin);
-      if (dot(d, d) >= cutoff * cutoff) continue;
-      EXPECT_EQ(listed[static_cast<std::size_t>(j)], 1);
-    }
-  }
 }
 
 TEST(RandomRoot, HoldsAllAndDiffersFromStateToState) {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "breccia/error.hpp"
-#include "spread_out.hpp"
+#include "deal_out.hpp"
 
 namespace breccia::gravity {
 namespace {
@@ -13,9 +13,6 @@ constexpr double kRadius = 5e4;
 
 Owner all_on(int rank) {
   return [rank](std::size_t) { return rank; };
-}
-Owner round_robin() {
-  return [](std::size_t i) { return static_cast<int>(i) % mpi::Comm().size(); };
 }
 // Slabs of x, as a run deals particles out.
 Owner slabs(const Cloud& cloud, double width) {
@@ -67,7 +64,7 @@ Parameters parameters(std::size_t each, double split = 0.8, double cutoff = 4.5)
 
 Field evaluate(const Cloud& cloud, const Parameters& p, const Owner& owner, int threads = 1, Stats* stats = nullptr) {
   const auto solver = make_solver(GravityMethod::kTreePm, p, mpi::Comm(), threads);
-  Field field = evaluate_spread_out(*solver, cloud, owner);
+  Field field = breccia::gravity::evaluate(*solver, cloud, owner);
   if (stats != nullptr) *stats = solver->last();
   return field;
 }
@@ -105,7 +102,7 @@ double norm(Vec3d v) { return std::sqrt(dot(v, v)); }
 // Direct sums in double by all ranks together.
 Field direct(const Cloud& cloud, double softening) {
   const auto solver = make_solver(GravityMethod::kDirect, {softening, Precision::kDouble}, mpi::Comm(), 1);
-  return evaluate_spread_out(*solver, cloud, round_robin());
+  return breccia::gravity::evaluate(*solver, cloud, round_robin());
 }
 
 // gravity.md 7 allows 4.5e-4 (default) and 1.2e-4 (tight) for bodies of 47,324 particles. Errors are those of near
