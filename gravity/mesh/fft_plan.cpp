@@ -68,7 +68,7 @@ void* make_plan(FftKind kind, int length, int count, int stride, int distance) {
 }  // namespace
 
 template <class Real>
-FftPlan<Real>::FftPlan(FftKind kind, int length, int count, int stride, int distance) : kind_(kind), plan_(nullptr) {
+FftPlan<Real>::FftPlan(FftKind kind, int length, int count, int stride, int distance) : kind_(kind) {
   if (length > 0 && count > 0) plan_ = make_plan<Real>(kind, length, count, stride, distance);
   if (plan_ == nullptr) throw UsageError("gravity mesh: no Fourier transform of length " + std::to_string(length));
 }

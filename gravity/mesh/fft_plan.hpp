@@ -34,7 +34,7 @@ class FftPlan {
 
  private:
   FftKind kind_;
-  void* plan_;
+  void* plan_ = nullptr;
 };
 
 /// Bytes that the arrays to be transformed are aligned to.
