@@ -21,13 +21,15 @@ void BlockTable::grow() {
 }
 
 std::uint32_t BlockTable::insert(BlockKey key) {
+  if (last_ < keys_.size() && keys_[last_] == key) return last_;
   if (2 * (keys_.size() + 1) > slots_.size()) grow();
   const std::size_t at = slot(key);
   if (slots_[at] == 0) {
     keys_.push_back(key);
     slots_[at] = static_cast<std::uint32_t>(keys_.size());
   }
-  return slots_[at] - 1;
+  last_ = slots_[at] - 1;
+  return last_;
 }
 
 std::uint32_t BlockTable::find(BlockKey key) const {

@@ -66,6 +66,7 @@ class BlockTable {
   void grow();
 
   std::vector<BlockKey> keys_;
+  std::uint32_t last_ = 0;            ///< inserted last: particles that follow each other mostly share a block
   std::vector<std::uint32_t> slots_;  ///< open addressing, index + 1, 0 = free
 };
 

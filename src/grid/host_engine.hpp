@@ -128,8 +128,8 @@ class HostEngine final : public Engine {
   std::vector<LonePull<P>> lone_pull_;
   double kick_ = 0.0;  // of the last grid update [s]
   BlockTable blocks_;
-  std::vector<Real> sums_;
-  std::vector<Real> velocities_;
+  LargeArray<Real> sums_;
+  LargeArray<Real> velocities_;
   std::vector<RowMask> rows_;
   std::vector<std::uint32_t> shared_blocks_;  // owned blocks that other ranks add to
   std::vector<char> is_shared_;               // the same, by block

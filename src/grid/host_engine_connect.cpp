@@ -77,8 +77,8 @@ void HostEngine<P>::connect_tiles() {
     sums_.reserve(nodes + nodes / 16);
     velocities_.reserve(nodes + nodes / 16);
   }
-  sums_.resize(nodes);
-  velocities_.resize(nodes);
+  sums_.resize(nodes, Real(0));
+  velocities_.resize(nodes, Real(0));
   rows_.assign(blocks_.size(), RowMask{});
   boundaries_.find_nodes(std::span(blocks_.keys()).first(owned_blocks_));
 }

@@ -14,6 +14,7 @@ struct Occupants {
   BlockTable blocks;
   std::vector<std::uint32_t> count;
   std::vector<std::uint32_t> member;
+  std::vector<std::uint32_t> block_of_placement;
 
   explicit Occupants(std::span<const Placement> placements) {
     for (std::uint32_t i = 0; i < placements.size(); ++i) {
@@ -23,6 +24,7 @@ struct Occupants {
         member.push_back(i);
       }
       ++count[b];
+      block_of_placement.push_back(b);
     }
   }
 };
@@ -42,9 +44,10 @@ SortedPlacements HostEngine<P>::separate(std::vector<Placement> placements) {
     return sorted;
   }
   const Occupants occupants(placements);
-  const auto is_alone = [&](const Placement& p) {
+  const auto is_alone = [&](std::size_t i) {
+    if (occupants.count[occupants.block_of_placement[i]] != 1) return false;
+    const Placement& p = placements[i];
     const BlockCoord own = block_of(p);
-    if (occupants.count[occupants.blocks.find(block_key(own))] != 1) return false;
     for (int n = 0; n < 27; ++n) {
       const std::array<int, 3> d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
       const BlockCoord there = periodicity_.wrap({own.x + d[0], own.y + d[1], own.z + d[2]});
@@ -64,7 +67,10 @@ SortedPlacements HostEngine<P>::separate(std::vector<Placement> placements) {
     }
     return true;
   };
-  for (const Placement& p : placements) (is_alone(p) ? sorted.lone : sorted.tiled).push_back(p);
+  sorted.tiled.reserve(placements.size());
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    (is_alone(i) ? sorted.lone : sorted.tiled).push_back(placements[i]);
+  }
   return sorted;
 }
 

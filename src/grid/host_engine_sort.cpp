@@ -221,7 +221,7 @@ void HostEngine<P>::arrange(const SortedPlacements& all) {
     lone_node_.push_back(node[slot]);
   }
   lone_pull_.resize(packs_for(lone_.particles));
-  store_.gather(source);
+  store_.gather(source, setup_.threads);
   for (std::size_t s = 0; s < node.size(); ++s)
     store_.kinematics[s / kLanes].node.set(static_cast<int>(s % kLanes), node[s]);
   blocks_.clear();

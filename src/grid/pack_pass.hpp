@@ -28,6 +28,16 @@ BRECCIA_HD Vec3<typename P::RealPack> gravity_of(const Arguments& a, std::size_t
   return g;
 }
 
+/// Asks for the fields of a pack ahead of their use: the tile's nodes lie on too many pages for the processor to see
+/// that the packs follow each other.
+template <class Fields>
+BRECCIA_HD void prefetch(const Fields* pack) {
+  constexpr std::size_t kLine = 64;
+  for (std::size_t n = 0; n < sizeof(Fields); n += kLine) {
+    __builtin_prefetch(reinterpret_cast<const char*>(pack) + n, 1, 3);
+  }
+}
+
 /// `Grid` has  GridVelocity<P> velocity(pack, lanes, kinematics)  and  scatter(pack, lanes, kinematics, stress,
 /// report), and says by kKeepsGradient whether C is stored at every step.
 template <class P, class Fx, class Grid>
@@ -43,9 +53,13 @@ class PackPass {
   BRECCIA_HD void run(std::size_t i, int lanes, TileReport& report) {
     Kinematics<P> k = a_.kinematics[i];
     auto state = load_state(a_, fx_, i);
-    PackStress<P> out{};
+    PackStress<P> out;
     if (a_.gather) {
+      prefetch(a_.kinematics + i + 1);
+      prefetch(a_.volume + i + 1);
       const GridVelocity<P> grid = grid_.velocity(i, lanes, k);
+      if (fx_.shear) prefetch(a_.elastic + i + 1);
+      if (fx_.energy) prefetch(a_.energy + i + 1);
       out.gradient = grid.gradient;
       const Real moved = horizontal_max(advance(a_, k, grid));
       if (moved > report.largest_move) report.largest_move = moved;
@@ -59,7 +73,9 @@ class PackPass {
       out.gradient = load_gradient(i);
     }
     if (a_.scatter) {
+      if (fx_.damage) prefetch(a_.flaws + i + 1);
       material::Dissipation<T> lost{};
+      out.tau = {};
       for_each_material(i, state, [&](const material::Constants<Real>& c, material::State<T>& s) BRECCIA_INLINE_LAMBDA {
         stress(c, s, out.gradient, i, lost, out.tau);
       });

@@ -1,41 +1,62 @@
 #include "grid/particles.hpp"
 
 #include <cstring>
+#include <vector>
 
 namespace breccia::grid {
 namespace {
 
 // Zeroes the packs from `first` on; an empty rank has none.
 template <class T>
-void clear(std::vector<T>& packs, std::size_t first) {
+void clear(LargeArray<T>& packs, std::size_t first) {
   if (packs.size() > first) {
     std::memset(static_cast<void*>(packs.data() + first), 0, (packs.size() - first) * sizeof(T));
   }
 }
 
-template <class T>
-std::vector<T> gathered(const std::vector<T>& old, std::span<const std::uint32_t> source, std::size_t lanes,
-                        std::span<const FieldDescriptor> table, Group group) {
-  std::vector<T> result(source.size() / lanes);
-  clear(result, 0);
-  const auto* from = reinterpret_cast<const std::byte*>(old.data());
-  auto* to = reinterpret_cast<std::byte*>(result.data());
-  for (const FieldDescriptor& field : table) {
-    if (field.group != group) continue;
-    const auto element = static_cast<std::size_t>(field.element_bytes);
-    const std::size_t pack_bytes = element * lanes;
-    for (std::size_t s = 0; s < source.size(); ++s) {
-      if (source[s] == ParticleStore<MixedPrecision>::kEmpty) continue;
-      const std::byte* a = from + source[s] / lanes * sizeof(T) + field.offset + source[s] % lanes * element;
-      std::byte* b = to + s / lanes * sizeof(T) + field.offset + s % lanes * element;
-      for (int c = 0; c < field.components; ++c) {
-        if (element == 4) {
-          std::memcpy(b, a, 4);
-        } else {
-          std::memcpy(b, a, 8);
-        }
-        a += pack_bytes;
-        b += pack_bytes;
+// The components of a field for all lanes of one pack: each lane from where `lane[l]` points to, components a pack
+// apart.
+template <class Element, std::size_t kLanes>
+void gather_components(const std::byte* const (&lane)[kLanes], std::byte* to, int components) {
+  for (int c = 0; c < components; ++c) {
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      std::memcpy(to + l * sizeof(Element), lane[l] + static_cast<std::size_t>(c) * kLanes * sizeof(Element),
+                  sizeof(Element));
+    }
+    to += kLanes * sizeof(Element);
+  }
+}
+
+// The packs of one group of fields, each slot s from source[s].
+template <class P, class T>
+LargeArray<T> gathered(const LargeArray<T>& old, std::span<const std::uint32_t> source, Group group, int threads) {
+  constexpr std::size_t kLanes = P::kLanes;
+  static const T kNothing{};  // of an empty lane
+  std::vector<FieldDescriptor> table;
+  for (const FieldDescriptor& field : fields<P>()) {
+    if (field.group == group) table.push_back(field);
+  }
+  LargeArray<T> result(source.size() / kLanes);
+#pragma omp parallel for schedule(static) num_threads(threads)
+  for (std::size_t pack = 0; pack < result.size(); ++pack) {
+    const T* from[kLanes];
+    std::size_t from_lane[kLanes];
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      const std::uint32_t s = source[pack * kLanes + l];
+      from[l] = s == ParticleStore<P>::kEmpty ? &kNothing : old.data() + s / kLanes;
+      from_lane[l] = s % kLanes;
+    }
+    for (const FieldDescriptor& field : table) {
+      const auto element = static_cast<std::size_t>(field.element_bytes);
+      const std::byte* lane[kLanes];
+      for (std::size_t l = 0; l < kLanes; ++l) {
+        lane[l] = reinterpret_cast<const std::byte*>(from[l]) + field.offset + from_lane[l] * element;
+      }
+      std::byte* to = reinterpret_cast<std::byte*>(result.data() + pack) + field.offset;
+      if (element == sizeof(std::uint32_t)) {
+        gather_components<std::uint32_t>(lane, to, field.components);
+      } else {
+        gather_components<std::uint64_t>(lane, to, field.components);
       }
     }
   }
@@ -187,8 +208,8 @@ std::size_t ParticleStore<P>::bytes_per_particle(const GroupSet& groups) {
 }
 
 template <class P>
-void ParticleStore<P>::gather(std::span<const std::uint32_t> source) {
-  for_each_group([&](Group group, auto& array) { array = gathered(array, source, kLanes, fields<P>(), group); });
+void ParticleStore<P>::gather(std::span<const std::uint32_t> source, int threads) {
+  for_each_group([&](Group group, auto& array) { array = gathered<P>(array, source, group, threads); });
 }
 
 template <class P>

@@ -7,8 +7,8 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
-#include <vector>
 
+#include "breccia/huge_pages.hpp"
 #include "breccia/precision.hpp"
 
 namespace breccia::grid {
@@ -130,7 +130,7 @@ class ParticleStore {
 
   /// Rearranges: new slot s holds what old slot source[s] held; kEmpty makes an empty lane. source.size() is a multiple
   /// of the lanes. One group at a time, so that the memory needed beside the particles stays small.
-  void gather(std::span<const std::uint32_t> source);
+  void gather(std::span<const std::uint32_t> source, int threads);
   static constexpr std::uint32_t kEmpty = 0xffffffffU;
 
   /// All fields of one slot as consecutive bytes, and back.
@@ -140,15 +140,15 @@ class ParticleStore {
   /// Adds empty packs at the end, keeping the others.
   void append_packs(std::size_t count);
 
-  std::vector<Kinematics<P>> kinematics;
-  std::vector<Volume<P>> volume;
-  std::vector<Elastic<P>> elastic;
-  std::vector<Energy<P>> energy;
-  std::vector<DamageLevel<P>> damage_level;
-  std::vector<Flaws<P>> flaws;
-  std::vector<HeldGravity<P>> gravity;
-  std::vector<Identity<P>> identity;
-  std::vector<Affine<P>> affine;
+  LargeArray<Kinematics<P>> kinematics;
+  LargeArray<Volume<P>> volume;
+  LargeArray<Elastic<P>> elastic;
+  LargeArray<Energy<P>> energy;
+  LargeArray<DamageLevel<P>> damage_level;
+  LargeArray<Flaws<P>> flaws;
+  LargeArray<HeldGravity<P>> gravity;
+  LargeArray<Identity<P>> identity;
+  LargeArray<Affine<P>> affine;
 
  private:
   template <class F>

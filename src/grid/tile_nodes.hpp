@@ -14,35 +14,52 @@ inline constexpr int kPairBlock[kPairs] = {0, 1, 1, 2};
 inline constexpr int kPairStart[kPairs] = {kBlockWidth - kTileMargin, 0, 2, 0};
 static_assert(kTileMargin == 2 && kBlockWidth == 4, "the tables above hold for these");
 
-/// Coordinates of a tile node along an axis: block below, own or above, and node inside it.
-constexpr int block_of_node(int n) { return (n + kBlockWidth - kTileMargin) / kBlockWidth; }
-constexpr int node_in_block(int n) { return (n + kBlockWidth - kTileMargin) % kBlockWidth; }
+/// The part of a box that lies in three blocks above each other.
+struct Column {
+  const std::uint32_t* blocks;  ///< along z
+  int in_block;                 ///< first node of the first row, in a block
+  int in_tile;                  ///< and in the tile
+  int rows_x, rows_y;
+};
 
-// Calls row(blocks along z, first node of the row in a block, first node in the tile) for the rows of a box.
+/// Calls visit(column) for the columns of a box.
 template <class F>
-BRECCIA_HD void for_each_row(const Tile& tile, const TileBox& box, F&& row) {
-  for (int x = box.low[0]; x <= box.high[0]; ++x) {
-    for (int y = box.low[1]; y <= box.high[1]; ++y) {
-      row(tile.neighbours + (block_of_node(x) * 3 + block_of_node(y)) * 3,
-          (node_in_block(x) * kBlockWidth + node_in_block(y)) * kBlockWidth, tile_index(x, y, 0));
+BRECCIA_HD void for_each_column(const Tile& tile, const TileBox& box, F&& visit) {
+  // Tile nodes of the blocks below, own and above along an axis.
+  constexpr int kFirst[3] = {0, kTileMargin, kTileMargin + kBlockWidth};
+  constexpr int kLast[3] = {kTileMargin - 1, kTileMargin + kBlockWidth - 1, kTileWidth - 1};
+  constexpr int kStart[3] = {kBlockWidth - kTileMargin, 0, 0};
+  for (int bx = 0; bx < 3; ++bx) {
+    const int x = box.low[0] > kFirst[bx] ? box.low[0] : kFirst[bx];
+    const int rows_x = (box.high[0] < kLast[bx] ? box.high[0] : kLast[bx]) - x + 1;
+    if (rows_x <= 0) continue;
+    for (int by = 0; by < 3; ++by) {
+      const int y = box.low[1] > kFirst[by] ? box.low[1] : kFirst[by];
+      const int rows_y = (box.high[1] < kLast[by] ? box.high[1] : kLast[by]) - y + 1;
+      const int row = (x - kFirst[bx] + kStart[bx]) * kBlockWidth + (y - kFirst[by] + kStart[by]);
+      visit(Column{tile.neighbours + (bx * 3 + by) * 3, row * kBlockWidth, tile_index(x, y, 0), rows_x, rows_y});
     }
   }
 }
 
-// Calls pair(block, node in it, node in the tile) for the pairs of a box.
+/// Calls pair(row in the block, row in the tile, p) for the pairs p of a column, rows counted in nodes from the first.
 template <class F>
-BRECCIA_HD void for_each_pair(const Tile& tile, const TileBox& box, F&& pair) {
+BRECCIA_HD void for_each_pair(const Column& column, const TileBox& box, F&& pair) {
   const int first = box.low[2] / 2;
   const int last = box.high[2] / 2;
   const bool all = first == 0 && last == kPairs - 1;
-  for_each_row(tile, box, [&](const std::uint32_t* blocks, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
-    if (all) {
-      // Unrolled, so that the cache misses of a row overlap.
-      for (int p = 0; p < kPairs; ++p) pair(blocks[kPairBlock[p]], in_block + kPairStart[p], in_tile + 2 * p);
-    } else {
-      for (int p = first; p <= last; ++p) pair(blocks[kPairBlock[p]], in_block + kPairStart[p], in_tile + 2 * p);
+  for (int x = 0; x < column.rows_x; ++x) {
+    for (int y = 0; y < column.rows_y; ++y) {
+      const int in_block = (x * kBlockWidth + y) * kBlockWidth;
+      const int in_tile = tile_index(x, y, 0);
+      if (all) {
+        // Unrolled, so that the cache misses of a row overlap.
+        for (int p = 0; p < kPairs; ++p) pair(in_block, in_tile, p);
+      } else {
+        for (int p = first; p <= last; ++p) pair(in_block, in_tile, p);
+      }
     }
-  });
+  }
 }
 
 template <class P>
@@ -52,6 +69,23 @@ constexpr std::size_t at(std::uint32_t block, int node) {
   return (std::size_t{block} * kBlockNodes + static_cast<std::size_t>(node)) * kChannels;
 }
 
+/// Where the pairs of a column begin; blocks that the tile does not know are replaced by `instead`.
+template <class Real>
+struct PairStarts {
+  Real* pair[kPairs];
+  BRECCIA_HD PairStarts(const Column& column, Real* blocks, Real* instead) {
+    for (int p = 0; p < kPairs; ++p) {
+      const std::uint32_t block = column.blocks[kPairBlock[p]];
+      const int node = column.in_block + kPairStart[p];
+      pair[p] = block == kNoBlock ? instead + node * kChannels : blocks + at(block, node);
+    }
+  }
+};
+
+/// Nodes of no block: zero wherever a tile may look.
+template <class Real>
+inline constexpr Real kNoNodes alignas(64)[kBlockNodes * kChannels] = {};
+
 }  // namespace detail
 
 /// The nodes of the box from the blocks. A box reaches only blocks that the tile knows.
@@ -59,42 +93,38 @@ template <class P>
 BRECCIA_HD void load_tile(const Tile& tile, const TileBox& box, const typename P::Real* blocks,
                           typename P::Real* nodes) {
   using N = detail::TwoNodes<P>;
-  detail::for_each_pair(tile, box, [&](std::uint32_t block, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
+  detail::for_each_column(tile, box, [&](const detail::Column& column) BRECCIA_INLINE_LAMBDA {
     // Where a box ends inside a pair, the other node may belong to a block that no particle reaches.
-    const N value = block == kNoBlock ? N(typename P::Real(0)) : N::load(blocks + detail::at(block, in_block));
-    value.store(nodes + in_tile * kChannels);
+    const detail::PairStarts<const typename P::Real> from(column, blocks, detail::kNoNodes<typename P::Real>);
+    detail::for_each_pair(column, box, [&](int in_block, int in_tile, int p) BRECCIA_INLINE_LAMBDA {
+      N::load(from.pair[p] + in_block * kChannels).store(nodes + (column.in_tile + in_tile + 2 * p) * kChannels);
+    });
   });
 }
 
-/// Asks for the nodes of a box ahead of their use; `write`: they will be added to.
-template <class P, int kWrite>
-BRECCIA_HD void prefetch_tile(const Tile& tile, const TileBox& box, const typename P::Real* blocks) {
-  constexpr std::size_t kLine = 64;
-  detail::for_each_pair(tile, box, [&](std::uint32_t block, int in_block, int) BRECCIA_INLINE_LAMBDA {
-    if (block == kNoBlock) return;
-    const auto* pair = reinterpret_cast<const char*>(blocks + detail::at(block, in_block));
-    for (std::size_t line = 0; line < sizeof(detail::TwoNodes<P>); line += kLine) {
-      __builtin_prefetch(pair + line, kWrite, 2);
-    }
-  });
-}
-
-/// Adds the nodes of the box to their blocks. Returns true if mass has reached a block that no particle of the tile
-/// could reach at the last sorting: a particle has drifted more than the margin allows.
+/// Adds the nodes of the box to their blocks and zeroes them. Returns true if mass has reached a block that no particle
+/// of the tile could reach at the last sorting: a particle has drifted more than the margin allows. `beyond`: a block
+/// of zeros, left as such.
 template <class P>
-[[nodiscard]] BRECCIA_HD bool add_tile(const Tile& tile, const TileBox& box, const typename P::Real* nodes,
-                                       typename P::Real* blocks) {
+[[nodiscard]] BRECCIA_HD bool add_tile(const Tile& tile, const TileBox& box, typename P::Real* nodes,
+                                       typename P::Real* blocks, typename P::Real* beyond) {
   using N = detail::TwoNodes<P>;
-  bool lost = false;
-  detail::for_each_pair(tile, box, [&](std::uint32_t block, int in_block, int in_tile) BRECCIA_INLINE_LAMBDA {
-    const typename P::Real* from = nodes + in_tile * kChannels;
-    if (block == kNoBlock) {
-      lost = lost || from[kMass] != typename P::Real(0) || from[kChannels + kMass] != typename P::Real(0);
-      return;
-    }
-    typename P::Real* to = blocks + detail::at(block, in_block);
-    (N::load(to) + N::load(from)).store(to);
+  bool unknown = false;
+  detail::for_each_column(tile, box, [&](const detail::Column& column) BRECCIA_INLINE_LAMBDA {
+    const detail::PairStarts<typename P::Real> to(column, blocks, beyond);
+    for (int bz = 0; bz < 3; ++bz) unknown = unknown || column.blocks[bz] == kNoBlock;
+    detail::for_each_pair(column, box, [&](int in_block, int in_tile, int p) BRECCIA_INLINE_LAMBDA {
+      typename P::Real* sum = to.pair[p] + in_block * kChannels;
+      typename P::Real* node = nodes + (column.in_tile + in_tile + 2 * p) * kChannels;
+      (N::load(sum) + N::load(node)).store(sum);
+      N(typename P::Real(0)).store(node);
+    });
   });
+  bool lost = false;
+  for (int n = 0; unknown && n < kBlockNodes; ++n) {
+    lost = lost || beyond[n * kChannels + kMass] != typename P::Real(0);
+  }
+  for (int n = 0; lost && n < kBlockNodes * kChannels; ++n) beyond[n] = typename P::Real(0);
   return lost;
 }
 
@@ -118,24 +148,6 @@ BRECCIA_HD void mark_rows(const Tile& tile, const TileBox& box, RowMask* rows) {
           const unsigned here = mask >> (8 * h) & 0xffU;
           if (here != 0) half = static_cast<std::uint8_t>(half | here);
         }
-      }
-    }
-  }
-}
-
-/// Zeroes the nodes that the particles of a tile can reach in one step from those of `box`.
-template <class P>
-BRECCIA_HD void clear_tile(const TileBox& box, typename P::Real* nodes) {
-  using N = detail::TwoNodes<P>;
-  TileBox wider;
-  for (int axis = 0; axis < 3; ++axis) {
-    wider.low[axis] = static_cast<std::int8_t>(box.low[axis] > 0 ? box.low[axis] - 1 : 0);
-    wider.high[axis] = static_cast<std::int8_t>(box.high[axis] < kTileWidth - 1 ? box.high[axis] + 1 : kTileWidth - 1);
-  }
-  for (int x = wider.low[0]; x <= wider.high[0]; ++x) {
-    for (int y = wider.low[1]; y <= wider.high[1]; ++y) {
-      for (int z = wider.low[2] & ~1; z <= wider.high[2]; z += 2) {
-        N(typename P::Real(0)).store(nodes + tile_index(x, y, z) * kChannels);
       }
     }
   }

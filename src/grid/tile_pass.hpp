@@ -11,7 +11,8 @@ namespace breccia::grid {
 template <class P>
 struct TileScratch {
   alignas(64) typename P::Real velocities[kTileNodes * kChannels];
-  alignas(64) typename P::Real sums[kTileNodes * kChannels];
+  alignas(64) typename P::Real sums[kTileNodes * kChannels];     ///< zero before and after each tile
+  alignas(64) typename P::Real beyond[kBlockNodes * kChannels];  ///< zero
 };
 
 /// The grid of a tile as its packs see it.
@@ -27,18 +28,17 @@ class TileGrid {
 
   BRECCIA_HD void load(std::uint32_t tile) {
     if (a_.gather) load_tile<P>(a_.tiles[tile], a_.boxes[tile], a_.velocities, scratch_.velocities);
-    if (a_.scatter) clear_tile<P>(a_.gather ? a_.boxes[tile] : kWholeTile, scratch_.sums);
-    if (a_.gather && a_.scatter && tile + 1 < a_.tile_count) {
-      prefetch_tile<P, 0>(a_.tiles[tile + 1], a_.boxes[tile + 1], a_.velocities);
-      prefetch_tile<P, 1>(a_.tiles[tile + 1], a_.boxes[tile + 1], a_.sums);
-    }
   }
 
   BRECCIA_HD void store(std::uint32_t tile, TileReport& report) {
     if (!a_.scatter) return;
     a_.boxes[tile] = touched_.box();
     mark_rows(a_.tiles[tile], a_.boxes[tile], a_.rows);
-    if (add_tile<P>(a_.tiles[tile], a_.boxes[tile], scratch_.sums, a_.sums)) ++report.strayed;
+    if (add_tile<P>(a_.tiles[tile], a_.boxes[tile], scratch_.sums, a_.sums, scratch_.beyond)) ++report.strayed;
+    if (strayed_) {
+      for (Real& sum : scratch_.sums) sum = Real(0);
+      ++report.strayed;
+    }
   }
 
   BRECCIA_HD GridVelocity<P> velocity(std::size_t, int lanes, const Kinematics<P>& k) {
@@ -51,10 +51,9 @@ class TileGrid {
              c * g.by_y[2], c * g.by_z[2]}};
   }
 
-  BRECCIA_HD void scatter(std::size_t i, int lanes, const Kinematics<P>& k, const PackStress<P>& s,
-                          TileReport& report) {
+  BRECCIA_HD void scatter(std::size_t i, int lanes, const Kinematics<P>& k, const PackStress<P>& s, TileReport&) {
     const auto place = stencil_.set(k);
-    if (any(Stencil<P>::outside(place))) ++report.strayed;
+    if (any(Stencil<P>::outside(place))) strayed_ = true;
     touched_.add(place, k.mass);
     grid::scatter<P>(scratch_.sums, stencil_, lanes, momentum_and_force(i, k, s));
   }
@@ -78,6 +77,7 @@ class TileGrid {
   TileScratch<P>& scratch_;
   Stencil<P> stencil_;
   BoxOfStencils<P> touched_;
+  bool strayed_ = false;
 };
 
 template <class P, class Fx>
