@@ -205,6 +205,31 @@ BRECCIA_HD Pack<S, 2 * W> join(Pack<S, W> a, Pack<S, W> b) {
   }
 }
 
+/// `low` in the lower half of the lanes, `high` in the upper half, both from memory.
+template <class S, int W>
+BRECCIA_HD Pack<S, W> halves(const S& low, const S& high) {
+#if defined(__AVX512F__)
+  // Two loads and no shuffle; g++ 12 finds that by itself only without the mask.
+  if constexpr (std::is_same_v<S, float> && W == 16) {
+    return __builtin_bit_cast(typename Pack<S, W>::Vector,
+                              _mm512_mask_broadcastss_ps(_mm512_set1_ps(low), 0xff00, _mm_load_ss(&high)));
+  }
+#endif
+  return join(Pack<S, W / 2>(low), Pack<S, W / 2>(high));
+}
+
+/// W / 2 lanes from memory, twice.
+template <class S, int W>
+BRECCIA_HD Pack<S, W> load_twice(const S* p) {
+#if defined(__AVX512DQ__)
+  if constexpr (std::is_same_v<S, float> && W == 16) {
+    return __builtin_bit_cast(typename Pack<S, W>::Vector, _mm512_maskz_broadcast_f32x8(0xffff, _mm256_loadu_ps(p)));
+  }
+#endif
+  const auto half = Pack<S, W / 2>::load(p);
+  return join(half, half);
+}
+
 template <class I, int W>
 BRECCIA_HD PackMask<I, W> operator&(PackMask<I, W> a, PackMask<I, W> b) {
   if constexpr (detail::kIsWide<I, W>) {

@@ -13,21 +13,29 @@ namespace detail {
 template <class P>
 using NodePair = Pack<typename P::Real, 2 * kChannels>;
 
+/// The same pointer, as one register: else the compiler keeps base and index apart and spends an instruction on every
+/// node to add them.
+template <class T>
+BRECCIA_HD T* in_one_register(T* pointer) {
+  asm("" : "+r"(pointer));
+  return pointer;
+}
+
 /// Weights of the two pairs along z, and those along x and y, of one lane.
 template <class P>
 struct PairWeights {
+  using Real = typename P::Real;
   using N = NodePair<P>;
   N wx[3], wy[3], wz[2], mz[2];
 
   BRECCIA_HD PairWeights(const Stencil<P>& s, int lane) {
-    using Half = Node<P>;
     for (int i = 0; i < 3; ++i) {
       wx[i] = N(s.weight[0][i][lane]);
       wy[i] = N(s.weight[1][i][lane]);
     }
     for (int p = 0; p < 2; ++p) {
-      wz[p] = join(Half(s.weight_z[2 * p][lane]), Half(s.weight_z[2 * p + 1][lane]));
-      mz[p] = join(Half(s.moment_z[2 * p][lane]), Half(s.moment_z[2 * p + 1][lane]));
+      wz[p] = halves<Real, N::kLanes>(s.weight_z[2 * p][lane], s.weight_z[2 * p + 1][lane]);
+      mz[p] = halves<Real, N::kLanes>(s.moment_z[2 * p][lane], s.moment_z[2 * p + 1][lane]);
     }
   }
 };
@@ -37,7 +45,7 @@ struct PairWeights {
 template <class P>
 BRECCIA_HD NodePair<P> gather_row(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
   using N = NodePair<P>;
-  const typename P::Real* origin = nodes + s.start[lane] * kChannels;
+  const auto* origin = in_one_register(nodes + s.start[lane] * kChannels);
   const PairWeights<P> w(s, lane);
   N plane[2], plane_x[2], plane_y[2];
   for (int p = 0; p < 2; ++p) {
@@ -65,15 +73,15 @@ BRECCIA_HD NodePair<P> gather_row(const typename P::Real* nodes, const Stencil<P
 }
 
 template <class P>
-BRECCIA_HD void scatter_row(typename P::Real* nodes, const Stencil<P>& s, int lane, const NodePair<P>& value_x,
-                            const NodePair<P>& y_z) {
+BRECCIA_HD void scatter_row(typename P::Real* nodes, const Stencil<P>& s, int lane, const typename P::Real* value_x,
+                            const typename P::Real* y_z) {
   using N = NodePair<P>;
-  typename P::Real* origin = nodes + s.start[lane] * kChannels;
+  auto* origin = in_one_register(nodes + s.start[lane] * kChannels);
   const PairWeights<P> w(s, lane);
-  const N value = twice_lower(value_x);
-  const N x = twice_upper(value_x);
-  const N y = twice_lower(y_z);
-  const N z = twice_upper(y_z);
+  const N value = load_twice<typename P::Real, N::kLanes>(value_x);
+  const N x = load_twice<typename P::Real, N::kLanes>(value_x + kChannels);
+  const N y = load_twice<typename P::Real, N::kLanes>(y_z);
+  const N z = load_twice<typename P::Real, N::kLanes>(y_z + kChannels);
   for (int p = 0; p < 2; ++p) {
     const N plane = w.wz[p] * value + w.mz[p] * z;
     const N plane_x = w.wz[p] * x;
@@ -109,20 +117,26 @@ BRECCIA_HD void gather_pairs(const typename P::Real* nodes, const Stencil<P>& s,
 
 template <class P>
 BRECCIA_HD void scatter_pairs(typename P::Real* nodes, const Stencil<P>& s, int lanes, const SpreadMomentum<P>& q) {
+  using Real = typename P::Real;
   using T = typename P::RealPack;
-  const T zero(typename P::Real(0));
+  const T zero(Real(0));
   T value_x[16] = {q.value[0], q.value[1], q.value[2], q.value[3], q.value[4], q.value[5], q.value[6], zero,
                    q.by_x[0],  q.by_x[1],  q.by_x[2],  q.by_x[3],  q.by_x[4],  q.by_x[5],  zero,       zero};
   T y_z[16] = {q.by_y[0], q.by_y[1], q.by_y[2], q.by_y[3], q.by_y[4], q.by_y[5], zero, zero,
                q.by_z[0], q.by_z[1], q.by_z[2], q.by_z[3], q.by_z[4], q.by_z[5], zero, zero};
   transpose16(value_x);
   transpose16(y_z);
+  alignas(64) Real row[2][16][16];
+  for (int l = 0; l < 16; ++l) {
+    value_x[l].store(row[0][l]);
+    y_z[l].store(row[1][l]);
+  }
   // Neighbours in the pack often lie in one cell: taking them in turns with those of the other half lets the stores of
   // one finish before the next reads the same nodes.
   constexpr int kHalf = P::kLanes / 2;
   for (int l = 0; l < kHalf && l < lanes; ++l) {
-    detail::scatter_row<P>(nodes, s, l, value_x[l], y_z[l]);
-    if (l + kHalf < lanes) detail::scatter_row<P>(nodes, s, l + kHalf, value_x[l + kHalf], y_z[l + kHalf]);
+    detail::scatter_row<P>(nodes, s, l, row[0][l], row[1][l]);
+    if (l + kHalf < lanes) detail::scatter_row<P>(nodes, s, l + kHalf, row[0][l + kHalf], row[1][l + kHalf]);
   }
 }
 

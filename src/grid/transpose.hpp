@@ -103,16 +103,6 @@ BRECCIA_HD Pack<S, 16> joined_halves(Pack<S, 16> a, Pack<S, 16> b) {
   return low + high;
 }
 
-/// The lower (upper) half in both halves.
-template <class S>
-BRECCIA_HD Pack<S, 16> twice_lower(Pack<S, 16> a) {
-  return __builtin_shufflevector(a.v, a.v, 0, 1, 2, 3, 4, 5, 6, 7, 0, 1, 2, 3, 4, 5, 6, 7);
-}
-template <class S>
-BRECCIA_HD Pack<S, 16> twice_upper(Pack<S, 16> a) {
-  return __builtin_shufflevector(a.v, a.v, 8, 9, 10, 11, 12, 13, 14, 15, 8, 9, 10, 11, 12, 13, 14, 15);
-}
-
 /// channels[c] gets channel c of all lanes from rows[lane]; W = 8 or 16 lanes.
 template <class S, int W>
 BRECCIA_HD void rows_to_channels(const Pack<S, 8>* rows, Pack<S, W> (&channels)[8]) {
