@@ -3,6 +3,7 @@
 // (window starts). Where the velocities come from and the momentum goes to is the business of `Grid`.
 #pragma once
 
+#include "grid/pack_fault.hpp"
 #include "grid/particle_pack.hpp"
 
 namespace breccia::grid {
@@ -44,25 +45,37 @@ class PackPass {
     Kinematics<P> k = a_.kinematics[i];
     auto state = load_state(a_, fx_, i);
     PackStress<P> out{};
+    material::Dissipation<T> lost{};
+    Real moved(0);
     if (a_.gather) {
       const GridVelocity<P> grid = grid_.velocity(i, lanes, k);
       out.gradient = grid.gradient;
-      const Real moved = horizontal_max(advance(a_, k, grid));
+      moved = horizontal_max(advance(a_, k, grid));
       if (moved > report.largest_move) report.largest_move = moved;
+      T increment(Real(0));
       for_each_material(i, state, [&](const material::Constants<Real>& c, material::State<T>& s) BRECCIA_INLINE_LAMBDA {
-        material::update_strain(fx_, c, s, out.gradient, a_.step);
+        increment = material::update_strain(fx_, c, s, out.gradient, a_.step);
         if (fx_.damage) grow_damage(a_, i, k.mass, c, s);
       });
-      a_.kinematics[i] = k;
-      if (Grid::kKeepsGradient || !a_.scatter) store_gradient(i, out.gradient);
+      report.clamped += clamped_lanes<P>(increment, k.mass);
     } else {
       out.gradient = load_gradient(i);
     }
     if (a_.scatter) {
-      material::Dissipation<T> lost{};
       for_each_material(i, state, [&](const material::Constants<Real>& c, material::State<T>& s) BRECCIA_INLINE_LAMBDA {
         stress(c, s, out.gradient, i, lost, out.tau);
       });
+    }
+    const auto faulty = faulty_lanes<P>(k, state, out.tau);
+    if (any(faulty) || moved >= Real(1)) {
+      record_fault<P>(*a_.fault, i, lanes, k, state, faulty);
+      return;
+    }
+    if (a_.gather) {
+      a_.kinematics[i] = k;
+      if (Grid::kKeepsGradient || !a_.scatter) store_gradient(i, out.gradient);
+    }
+    if (a_.scatter) {
       out.volume = reference_volume(i, k.mass);
       report.plastic_work += static_cast<double>(horizontal_sum(out.volume * lost.plastic));
       report.viscous_work += static_cast<double>(horizontal_sum(out.volume * lost.viscous));

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 1;
+constexpr std::int64_t kFormat = 2;
 constexpr std::string_view kPrefix = "checkpoint_";
 constexpr std::string_view kSuffix = ".h5";
 
@@ -46,7 +46,7 @@ void take_bits(StateColumn& column, const std::vector<T>& values) {
 
 std::uint64_t bytes_needed(const EngineState& state, const std::string& run, const mpi::Comm& comm) {
   constexpr std::uint64_t kTables = std::uint64_t{1} << 20;
-  std::uint64_t bytes = 4 * (state.node.size() + state.flaw_count.size() + state.flaw_thresholds.size());
+  std::uint64_t bytes = 4 * state.node.size();
   for (const StateColumn& column : state.columns) bytes += column.values.size();
   return comm.sum(bytes) + run.size() + kTables;
 }
@@ -81,13 +81,6 @@ void write_content(h5::File& file, const Checkpoint& checkpoint, const mpi::Comm
   for (const StateColumn& column : state.columns) write_column(file, column, total, rows);
   file.write_rows("/Particles/node", {total, 3, 0}, rows, bits(state.node));
 
-  const bool flaws = comm.any(!state.flaw_count.empty());
-  if (flaws) {
-    const std::uint64_t mine = state.flaw_thresholds.size();
-    file.write_rows("/Particles/flaw_count", {total, 1, 0}, rows, bits(state.flaw_count));
-    file.write_rows("/FlawThresholds", {comm.sum(mine), 1, 0}, {comm.exclusive_scan(mine), mine},
-                    bits(state.flaw_thresholds));
-  }
   file.create_group("/Engine");
   file.write_attribute("/Engine", "Format", kFormat);
   file.write_attribute("/Engine", "DamageFinished", std::int64_t{state.damage_finished});
@@ -156,14 +149,6 @@ void read_engine(const h5::File& file, EngineState& state, const mpi::Comm& comm
   }
   if (components_of(file, "/Particles/node", total) != 3) throw IoError("/Particles/node: unexpected shape");
   state.node = read_bits<std::int32_t>(file, "/Particles/node", rows, 3);
-  if (file.exists("/Particles/flaw_count")) {
-    state.flaw_count = read_bits<std::uint32_t>(file, "/Particles/flaw_count", rows, 1);
-    const std::uint64_t mine = std::accumulate(state.flaw_count.begin(), state.flaw_count.end(), std::uint64_t{0});
-    if (file.shape("/FlawThresholds") != std::vector{comm.sum(mine)}) {
-      throw IoError("/FlawThresholds: unexpected shape");
-    }
-    state.flaw_thresholds = read_bits<float>(file, "/FlawThresholds", {comm.exclusive_scan(mine), mine}, 1);
-  }
   std::int64_t damage_finished = 0;
   std::int64_t axis = 0;
   file.read_attribute("/Engine", "DamageFinished", damage_finished);
