@@ -8,15 +8,6 @@
 
 namespace breccia::grid {
 
-/// What a pack gives to the grid, lanes = particles.
-template <class P>
-struct PackStress {
-  using T = typename P::RealPack;
-  Mat3<T> gradient;  ///< C^{n-1/2} [1/s]
-  T volume;          ///< reference volume m / rho0 [m3]
-  Sym3<T> tau;       ///< Kirchhoff stress [Pa]
-};
-
 /// Acceleration of pack `i` by the held and the uniform gravity [m/s2]. Arguments: PassArguments or ProbeArguments.
 template <class P, class Arguments>
 BRECCIA_HD Vec3<typename P::RealPack> gravity_of(const Arguments& a, std::size_t i) {
@@ -66,11 +57,8 @@ class PackPass {
         stress(c, s, out.gradient, i, lost, out.tau);
       });
     }
-    const auto faulty = faulty_lanes<P>(k, state, out.tau);
-    if (any(faulty) || moved >= Real(1)) {
-      record_fault<P>(*a_.fault, i, lanes, k, state, faulty);
-      return;
-    }
+    const T sum = sum_of_state<P>(k, state, out, a_.scatter);
+    if ((any_not_finite(sum) || moved >= Real(1)) && found_fault<P>(*a_.fault, i, lanes, moved, k, state, sum)) return;
     if (a_.gather) {
       a_.kinematics[i] = k;
       if (Grid::kKeepsGradient || !a_.scatter) store_gradient(i, out.gradient);

@@ -186,7 +186,11 @@ void remove_other_checkpoints(const fs::path& folder, std::uint64_t newest, std:
     std::uint64_t kept = 0;
     for (const std::uint64_t number : numbers) {
       if (number > newest || kept == keep) {
-        fs::remove(folder / checkpoint_name(number));
+        // One that cannot be removed takes space, but is no reason to end a run.
+        std::error_code error;
+        fs::remove(folder / checkpoint_name(number), error);
+        if (error) fmt::print(stderr, "breccia: warning: {}: cannot be removed: {}\n",
+                              (folder / checkpoint_name(number)).string(), error.message());
       } else {
         ++kept;
       }

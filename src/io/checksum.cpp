@@ -60,7 +60,11 @@ std::uint64_t crc_of(const std::filesystem::path& path, std::uint64_t length, co
 // The root's size of the file, on all ranks.
 std::uint64_t size_of(const std::filesystem::path& path, const mpi::Comm& comm) {
   std::uint64_t size = 0;
-  on_root(comm, [&] { size = std::filesystem::file_size(path); });
+  on_root(comm, [&] {
+    std::error_code error;
+    size = std::filesystem::file_size(path, error);
+    if (error) throw IoError(fmt::format("{}: {}", path.string(), error.message()));
+  });
   return comm.max(size);
 }
 

@@ -17,6 +17,7 @@
 #include "io/snapshot_series.hpp"
 #include "sim/checkpoints.hpp"
 #include "sim/dump.hpp"
+#include "sim/own_folder.hpp"
 #include "sim/progress.hpp"
 #include "sim/stop_requests.hpp"
 #include "sim/time_loop.hpp"
@@ -276,6 +277,7 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   if (options.restart.empty()) {
     io::prepare_output_folder(options.out, comm);
   } else {
+    require_own_folder(options.out, scene, options.resolved, comm);
     if (options.restart == "auto" && finished(options.out, end, options, comm)) {
       if (comm.is_root()) fmt::print("{}: this run is finished\n", options.out.string());
       return;
