@@ -2,7 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "breccia/error.hpp"
 #include "io/collectively.hpp"
@@ -35,6 +37,18 @@ void require_writable(const fs::path& folder) {
   fs::remove(probe);
 }
 
+// What a run that was killed had not yet given its name.
+void remove_unfinished(const fs::path& folder) {
+  std::vector<fs::path> unfinished;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if ((name.starts_with("snap_") || name.starts_with("checkpoint_")) && name.ends_with(".part")) {
+      unfinished.push_back(entry.path());
+    }
+  }
+  for (const fs::path& path : unfinished) fs::remove(path);
+}
+
 }  // namespace
 
 void prepare_output_folder(const fs::path& folder, const mpi::Comm& comm) {
@@ -50,6 +64,7 @@ void continue_output_folder(const fs::path& folder, const mpi::Comm& comm) {
     create(folder);
     if (!fs::exists(folder / "diagnostics.csv")) require_empty(folder);
     require_writable(folder);
+    remove_unfinished(folder);
   });
 }
 
