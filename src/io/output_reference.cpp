@@ -35,7 +35,8 @@ double precision value back exactly.
 {diagnostics}
 ## `checkpoint_NNNN.h5`
 
-A checkpoint: everything a run needs to go on, bit for bit, in parallel HDF5 with a CRC-32 of the whole file behind its end.
+A checkpoint: everything a run needs to go on, bit for bit, in parallel HDF5 with a CRC-32 of the whole file behind its end
+and, in the attribute `Checksum`, one of the values of each dataset as they were in memory.
 `/Particles` has the fields of the engine by their bits, in storage order (the flaws of the particles are drawn again
 from the scene); `/Engine` the slabs and the particles of each rank; `/Run` the rest as JSON. The
 newest `output.keep` stay. They are read by the version that wrote them, on any number of ranks; for results take snapshots.

@@ -73,9 +73,9 @@ TimeLoop::Visit until_end(Outcome& run, const mpi::Comm& comm) {
   };
 }
 
-Outcome run_through(const Scene& scene, const std::filesystem::path& file, const mpi::Comm& comm) {
+Outcome run_through(const Scene& scene, const std::filesystem::path& file, const mpi::Comm& comm, int threads = 1) {
   Outcome run;
-  TimeLoop loop(scene, resolve_effects(scene), 1, comm);
+  TimeLoop loop(scene, resolve_effects(scene), threads, comm);
   loop.run(until_end(run, comm), [&](const TimeLoop& now) {
     if (now.step() != kCheckpoint) return true;
     run.at_checkpoint = now.state();
@@ -85,10 +85,11 @@ Outcome run_through(const Scene& scene, const std::filesystem::path& file, const
   return run;
 }
 
-Outcome run_on(const Scene& scene, const std::filesystem::path& file, const LoopState& state, const mpi::Comm& comm) {
+Outcome run_on(const Scene& scene, const std::filesystem::path& file, const LoopState& state, const mpi::Comm& comm,
+               int threads = 1) {
   Outcome run;
   EXPECT_EQ(io::damage_of(file, comm), "");
-  TimeLoop loop(scene, resolve_effects(scene), io::read_checkpoint(file, comm).engine, state, 1, comm);
+  TimeLoop loop(scene, resolve_effects(scene), io::read_checkpoint(file, comm).engine, state, threads, comm);
   loop.run(until_end(run, comm));
   return run;
 }
@@ -131,6 +132,31 @@ TEST(Checkpoint, FluidWithoutEnergy) {
 // Bodies so thin that most particles share no node with others and go without grid.
 TEST(Checkpoint, LoneParticles) {
   expect_bitwise({"grid.cell=1500 m", "body[0].particles=300", "body[1].particles=300"});
+}
+
+// Neither the interrupted run nor the continued one depends on the threads.
+TEST(Checkpoint, OtherNumberOfThreads) {
+  const mpi::Comm comm;
+  const SharedFile file(comm);
+  const Scene scene = load(collision(9e3), {"gravity.interval=8", "numerics.precision=mixed"});
+  const Outcome whole = run_through(scene, file.path(), comm, 3);
+  expect_same_bits(whole, run_on(scene, file.path(), whole.at_checkpoint, comm, 2));
+  expect_same_bits(whole, run_on(scene, file.path(), whole.at_checkpoint, comm, 1));
+}
+
+// Mixed precision, damage growing: what there is most of. HDF5's own tables are some kB.
+TEST(Checkpoint, BytesPerParticle) {
+  const mpi::Comm comm;
+  const SharedFile file(comm);
+  const Scene scene = load(collision(5e3), {"gravity.interval=8", "numerics.precision=mixed"});
+  TimeLoop loop(scene, resolve_effects(scene), 1, comm);
+  const auto particles = static_cast<double>(comm.sum(loop.engine().stats().particles));
+  loop.run([](const TimeLoop&) { return true; },
+           [&](const TimeLoop& now) {
+             io::write_checkpoint(file.path(), {now.engine().save(), "{}"}, comm);
+             return false;
+           });
+  EXPECT_LE(static_cast<double>(std::filesystem::file_size(file.path())), 200.0 * particles);
 }
 
 // Damage that ended before the checkpoint: its fields are gone while the scene asks for them.
