@@ -43,6 +43,13 @@ const StateColumn& find_column(const EngineState& state, const std::string& name
   return *found;
 }
 
+void require_slabs(const EngineState& state, int ranks) {
+  const bool cut_for_all = !state.same_ranks || state.slab_cuts.size() + 1 == static_cast<std::size_t>(ranks);
+  if (state.slab_axis < 0 || state.slab_axis > 2 || !cut_for_all || !std::ranges::is_sorted(state.slab_cuts)) {
+    throw IoError("the checkpoint has slabs that are none");
+  }
+}
+
 }  // namespace
 
 template <class P>
@@ -91,6 +98,7 @@ void HostEngine<P>::restore(const EngineState& state, const material::FlawLists&
   if (state.damage_finished && setup_.effects.damage) switch_damage_off();
   std::vector<Placement> placements;
   mpi::together<IoError>(comm_, [&] {
+    require_slabs(state, comm_.size());
     placements = restore_places(state);
     for (const FieldDescriptor& field : fields<P>()) {
       if (store_.has(field.group) && saved_as_it_is(field)) restore_field(field, state);
@@ -115,7 +123,8 @@ std::vector<Placement> HostEngine<P>::restore_places(const EngineState& state) {
     placements[i].slot = static_cast<std::uint32_t>(i);
     for (std::size_t axis = 0; axis < 3; ++axis) {
       const std::int32_t node = state.node[3 * i + axis];
-      if (node >= kBlockWidth * (kBlockLimit + 1) || node < -kBlockWidth * kBlockLimit) {
+      const std::int32_t block = node >> 2;
+      if (block > kBlockLimit || block < -kBlockLimit || periodicity_.wrap(block, static_cast<int>(axis)) != block) {
         throw IoError("the checkpoint has a particle outside the grid");
       }
       placements[i].node[axis] = node;

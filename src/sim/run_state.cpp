@@ -57,6 +57,10 @@ LoopState loop_from(const Json& json) {
   for (const Json& work : json.at("lost_work")) {
     loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>(), work.at(2).get<std::uint64_t>()});
   }
+  const bool steps = loop.dt > 0.0 && loop.previous_dt > 0.0 && std::isfinite(loop.dt + loop.previous_dt);
+  if (!steps || !(loop.time >= 0.0) || !std::isfinite(loop.time) || loop.sort_interval < 1) {
+    throw IoError("the state of the run has times that are none");
+  }
   return loop;
 }
 
@@ -87,7 +91,9 @@ Json schedule_json(const ScheduleState& schedule) {
 }
 
 ScheduleState schedule_from(const Json& json) {
-  return {json.at("interval").get<double>(), null_is_never(json.at("next"))};
+  const ScheduleState schedule{json.at("interval").get<double>(), null_is_never(json.at("next"))};
+  if (!(schedule.next >= 0.0)) throw IoError("the state of the run has an output at a time that is none");
+  return schedule;
 }
 
 Json output_json(const OutputState& output) {

@@ -136,6 +136,10 @@ int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   for (int n = 0; n < 8 && !changes.done(); ++n) change(engine, state, changes);
   const std::uint64_t first = state.step;
   try {
+    // As it comes out of a file.
+    sim::RunState run;
+    run.loop = state;
+    state = sim::run_state_from(sim::to_text(run)).loop;
     sim::TimeLoop loop(from.scene, from.effects, engine, state, 1, mpi::Comm());
     loop.run([&](const sim::TimeLoop& now) { return now.step() - first < 4; });
   } catch (const UsageError&) {

@@ -25,8 +25,7 @@ void expect_user_errors(Body&& body) {
   try {
     body();
   } catch (const Error& error) {
-    const bool one_line = std::string_view(error.what()).find('\n') == std::string_view::npos;
-    if ((error.code() != ExitCode::kUsage && error.code() != ExitCode::kIo) || !one_line) std::abort();
+    if (error.code() != ExitCode::kUsage && error.code() != ExitCode::kIo) std::abort();
   }
 }
 

@@ -22,7 +22,7 @@ def run(root, options):
     seconds = QUICK_SECONDS if options.quick else getattr(options, "seconds", 600)
     clang.build(root, "fuzz", "tests/fuzz")
     # Open MPI never frees some of its memory.
-    environment = dict(os.environ, ASAN_OPTIONS="detect_leaks=0", UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1")
+    environment = dict(os.environ, ASAN_OPTIONS="detect_leaks=0:handle_abort=1", UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1")
     findings = 0
     chosen = getattr(options, "target", None) or targets(root)
     for name in chosen:
