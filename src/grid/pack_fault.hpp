@@ -68,8 +68,8 @@ static int fastest_lane(const Kinematics<P>& k, int lanes) {
 /// on the threads.
 template <class P>
 [[gnu::noinline, gnu::cold]] static void record_fault(PassFault& fault, std::size_t i, int lane, bool finite,
-                                               const Kinematics<P>& k,
-                                               const material::State<typename P::RealPack>& s) {
+                                                      const Kinematics<P>& k,
+                                                      const material::State<typename P::RealPack>& s) {
   const auto slot = static_cast<std::uint32_t>(i * P::kLanes + static_cast<std::size_t>(lane));
   while (__atomic_exchange_n(&fault.lock, 1, __ATOMIC_ACQUIRE) != 0) {
   }
@@ -88,9 +88,9 @@ template <class P>
 /// True if the pack must not go on; `moved`: largest |dx| of a lane [cells].
 template <class P>
 [[gnu::noinline, gnu::cold]] static bool found_fault(PassFault& fault, std::size_t i, int lanes, typename P::Real moved,
-                                              const Kinematics<P>& k,
-                                              const material::State<typename P::RealPack>& s,
-                                              typename P::RealPack sum) {
+                                                     const Kinematics<P>& k,
+                                                     const material::State<typename P::RealPack>& s,
+                                                     typename P::RealPack sum) {
   const int broken = first_not_finite(sum, lanes);
   if (broken < 0 && !(moved >= typename P::Real(1))) return false;
   record_fault<P>(fault, i, broken < 0 ? fastest_lane<P>(k, lanes) : broken, broken < 0, k, s);

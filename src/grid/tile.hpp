@@ -77,12 +77,12 @@ struct TileReport {
 /// What would have become of the first particle a pass could not take on; its pack is left as it was before.
 struct PassFault {
   static constexpr std::uint32_t kNone = 0xffffffffU;
-  std::uint32_t slot = kNone;  ///< pack * lanes + lane; the lowest of all
-  int lock = 0;                ///< tiles of several threads may fail at once
-  bool finite = false;         ///< false: not finite; true: it moved a cell or more in one step
-  double velocity[3] = {};     ///< [m/s]
-  double volume_change = 0.0;  ///< J - 1
-  double energy = 0.0;         ///< [J/kg]
+  std::uint32_t slot = kNone;       ///< pack * lanes + lane; the lowest of all
+  int lock = 0;                     ///< tiles of several threads may fail at once
+  bool finite = false;              ///< false: not finite; true: it moved a cell or more in one step
+  double velocity[3] = {};          ///< [m/s]
+  double volume_change = 0.0;       ///< J - 1
+  double energy = 0.0;              ///< [J/kg]
   double kirchhoff_pressure = 0.0;  ///< J P [Pa]
   double damage_root = 0.0;         ///< D^(1/3)
 };

@@ -55,7 +55,8 @@ std::uint64_t bytes_needed(const EngineState& state, const std::string& run, con
 // the file only knows what became of it there.
 constexpr const char* kChecksum = "Checksum";
 
-void write_checksum(h5::File& file, const std::string& dataset, std::span<const std::byte> mine, const mpi::Comm& comm) {
+void write_checksum(h5::File& file, const std::string& dataset, std::span<const std::byte> mine,
+                    const mpi::Comm& comm) {
   file.write_attribute(dataset, kChecksum, static_cast<std::int64_t>(checksum_over_ranks(mine, comm)));
 }
 
@@ -218,8 +219,9 @@ void remove_other_checkpoints(const fs::path& folder, std::uint64_t newest, std:
         // One that cannot be removed takes space, but is no reason to end a run.
         std::error_code error;
         fs::remove(folder / checkpoint_name(number), error);
-        if (error) fmt::print(stderr, "breccia: warning: {}: cannot be removed: {}\n",
-                              (folder / checkpoint_name(number)).string(), error.message());
+        if (error)
+          fmt::print(stderr, "breccia: warning: {}: cannot be removed: {}\n",
+                     (folder / checkpoint_name(number)).string(), error.message());
       } else {
         ++kept;
       }

@@ -159,7 +159,7 @@ BRECCIA_HD Sym3<T> update_stress(Fx fx, const Constants<R>& k, State<T>& state, 
 /// velocity_gradient. Returns det(I + A) - 1; below kLeastVolumeIncrement the change of J was cut (hard case 3).
 template <class Fx, class R, class T>
 BRECCIA_HD T update_strain(Fx fx, const Constants<R>& k, State<T>& state, const Mat3<T>& velocity_gradient,
-                              scalar_of<T> step) {
+                           scalar_of<T> step) {
   const T zero(R(0));
   if (fx.energy) {
     Dev3<T> s{zero, zero, zero, zero, zero};

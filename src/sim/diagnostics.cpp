@@ -139,12 +139,11 @@ void Budget::require_no_gain(const io::DiagnosticsRow& row) const {
   const double gain = std::max(row.energy_residual, state_.first.internal_energy - row.internal_energy);
   if (gain <= energy_gain_ * scale) return;
   const char* const what = gain == row.energy_residual ? "the total energy rose" : "motion took internal energy away";
-  throw NumericsError(
-      fmt::format("{} by {:.6g} J since the start, {:.3g} of the largest kinetic + |potential| energy (allowed: {:.3g}, "
-                  "numerics.energy_gain); kinetic {:.6g} J, internal {:.6g} J, gravitational {:.6g} J; the run is "
-                  "unstable: try a smaller time.step or time.cfl",
-                  what, gain, gain / scale, energy_gain_, row.kinetic_energy, row.internal_energy,
-                  row.gravitational_energy));
+  throw NumericsError(fmt::format(
+      "{} by {:.6g} J since the start, {:.3g} of the largest kinetic + |potential| energy (allowed: {:.3g}, "
+      "numerics.energy_gain); kinetic {:.6g} J, internal {:.6g} J, gravitational {:.6g} J; the run is "
+      "unstable: try a smaller time.step or time.cfl",
+      what, gain, gain / scale, energy_gain_, row.kinetic_energy, row.internal_energy, row.gravitational_energy));
 }
 
 void Budget::follow(const io::DiagnosticsRow& row, double momentum_scale, double angular_scale) {

@@ -22,8 +22,8 @@ class Budget {
   Budget(gravity::Solver* solver, Vec3d uniform_gravity, const mpi::Comm& comm, double energy_gain = kEnergyGain)
       : solver_(solver), uniform_gravity_(uniform_gravity), comm_(comm), energy_gain_(energy_gain) {}
 
-  /// The row at t_n, after Engine::update_grid(). Collective. Throws NumericsError if a sum is not finite, a particle or
-  /// mass is missing or energy was gained; time, step, dt and wall_seconds are left to the caller.
+  /// The row at t_n, after Engine::update_grid(). Collective. Throws NumericsError if a sum is not finite, a particle
+  /// or mass is missing or energy was gained; time, step, dt and wall_seconds are left to the caller.
   io::DiagnosticsRow row(const grid::Engine& engine, const ParticleOutput& particles, const LostWork& lost);
 
   /// Self-gravity at each particle [J/kg]; empty without a solver. Collective.

@@ -17,8 +17,11 @@ using Json = nlohmann::ordered_json;
 Json json_of(Vec3d v) { return {v.x, v.y, v.z}; }
 
 Json json_of(const grid::ParticleValues& p) {
-  return {{"velocity", json_of(p.velocity)}, {"J", p.volume_ratio},      {"internal_energy", p.energy},
-          {"kirchhoff_pressure", p.pressure}, {"damage", p.damage}};
+  return {{"velocity", json_of(p.velocity)},
+          {"J", p.volume_ratio},
+          {"internal_energy", p.energy},
+          {"kirchhoff_pressure", p.pressure},
+          {"damage", p.damage}};
 }
 
 Json report(const TimeLoop& loop, const std::string& error) {
@@ -38,8 +41,8 @@ Json report(const TimeLoop& loop, const std::string& error) {
 
 }  // namespace
 
-std::string dump(const TimeLoop& loop, const Scene& scene, const std::string& error, const std::filesystem::path& folder,
-                 const mpi::Comm& comm) {
+std::string dump(const TimeLoop& loop, const Scene& scene, const std::string& error,
+                 const std::filesystem::path& folder, const mpi::Comm& comm) {
   try {
     io::on_root(comm, [&] { io::write_file(folder / "dump.json", report(loop, error).dump(1) + "\n"); });
     io::SnapshotHeader header;

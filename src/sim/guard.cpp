@@ -50,10 +50,10 @@ void Guard::check(const grid::Engine& engine) {
   }
   if (sums[1] > 0.0) {
     const grid::ParticleSample p = fastest(engine);
-    throw NumericsError(
-        fmt::format("particles moved more than a cell between two sortings, among them particle {} at {} m with {}; {}, "
-                    "or a shorter numerics.sort_interval",
-                    p.id, text_of(p.position), text_of(p.values), kAdvice));
+    throw NumericsError(fmt::format(
+        "particles moved more than a cell between two sortings, among them particle {} at {} m with {}; {}, "
+        "or a shorter numerics.sort_interval",
+        p.id, text_of(p.position), text_of(p.values), kAdvice));
   }
   if (sums[2] != static_cast<double>(particles_)) {
     throw NumericsError(fmt::format("{} particles are left of {}", sums[2], particles_));
@@ -63,10 +63,10 @@ void Guard::check(const grid::Engine& engine) {
 void Guard::check_step(double dt, const grid::Engine& engine) {
   if (dt >= kCollapse * step_at_rest_ && std::isfinite(dt)) return;
   const grid::ParticleSample p = fastest(engine);
-  throw NumericsError(
-      fmt::format("the stable time step has fallen to {:.6g} s, from {:.6g} s at rest; the fastest particle is {} at {} "
-                  "m with {}; {}",
-                  dt, step_at_rest_, p.id, text_of(p.position), text_of(p.values), kAdvice));
+  throw NumericsError(fmt::format(
+      "the stable time step has fallen to {:.6g} s, from {:.6g} s at rest; the fastest particle is {} at {} "
+      "m with {}; {}",
+      dt, step_at_rest_, p.id, text_of(p.position), text_of(p.values), kAdvice));
 }
 
 // The earliest one, of several the one of the lowest rank.
@@ -86,10 +86,11 @@ grid::ParticleSample Guard::fastest(const grid::Engine& engine) const {
   };
   const auto mine = engine.fastest();
   Candidate worst{};
-  for (const Candidate& c : comm_.allgather(
-           Candidate{mine.has_value(), engine.strayed(), mine.value_or(grid::ParticleSample{})})) {
+  for (const Candidate& c :
+       comm_.allgather(Candidate{mine.has_value(), engine.strayed(), mine.value_or(grid::ParticleSample{})})) {
     if (!c.is_there) continue;
-    const bool faster = largest_component(c.particle.values.velocity) > largest_component(worst.particle.values.velocity);
+    const bool faster =
+        largest_component(c.particle.values.velocity) > largest_component(worst.particle.values.velocity);
     if (!worst.is_there || c.strayed > worst.strayed || (c.strayed == worst.strayed && faster)) worst = c;
   }
   return worst.particle;

@@ -21,8 +21,8 @@ struct GuardedFault {
 
 class Guard {
  public:
-  /// A step this much smaller than that of the scene at rest is a collapse: sound is at most a few times faster in shocked
-  /// rock, and no impact this code is for reaches a hundred times the sound speed.
+  /// A step this much smaller than that of the scene at rest is a collapse: sound is at most a few times faster in
+  /// shocked rock, and no impact this code is for reaches a hundred times the sound speed.
   static constexpr double kCollapse = 1e-3;
 
   /// `step_at_rest`: the stable time step of the scene at rest [s].

@@ -46,9 +46,10 @@ void require_own_folder(const fs::path& folder, const Scene& scene, const std::v
     const fs::path snapshot = folder / io::snapshot_name(0);
     if (name.empty() && fs::exists(snapshot)) name = io::scene_name_in(snapshot);
     if (!name.empty() && name != scene.name) {
-      throw IoError(fmt::format("output folder {} holds results of the scene \"{}\", this one is \"{}\": name another "
-                                "folder with --out",
-                                folder.string(), name, scene.name));
+      throw IoError(
+          fmt::format("output folder {} holds results of the scene \"{}\", this one is \"{}\": name another "
+                      "folder with --out",
+                      folder.string(), name, scene.name));
     }
     if (!finished.empty() && !keys.empty()) require_same_scene(finished, keys, (folder / "summary.json").string());
   });

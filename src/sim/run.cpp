@@ -131,11 +131,12 @@ class Output {
 
   void warn_of_clamped(double time) const {
     if (!comm_.is_root()) return;
-    fmt::print(stderr,
-               "breccia: warning: until t = {:.6g} s, {} volume changes of a particle were cut, the grid asking for "
-               "det(I + dt L) <= 0.1 in one step; clamped_volumes in diagnostics.csv counts them, a smaller time.step or "
-               "time.cfl avoids them\n",
-               time, last_row_.clamped_volumes);
+    fmt::print(
+        stderr,
+        "breccia: warning: until t = {:.6g} s, {} volume changes of a particle were cut, the grid asking for "
+        "det(I + dt L) <= 0.1 in one step; clamped_volumes in diagnostics.csv counts them, a smaller time.step or "
+        "time.cfl avoids them\n",
+        time, last_row_.clamped_volumes);
   }
 
   void write_snapshot(const TimeLoop& loop, const ParticleOutput& particles) {

@@ -119,8 +119,8 @@ std::unique_ptr<grid::Engine> make_restored_engine(const Scene& scene, const Res
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
                                                  const ParticleArrays& particles, int threads, const mpi::Comm& comm) {
   auto engine = make_empty_engine(scene, effects, threads, comm);
-  const material::FlawLists flaws = effects.material.damage ? draw_all_flaws(scene, {particles.id, particles.body})
-                                                            : no_flaws(particles.size());
+  const material::FlawLists flaws =
+      effects.material.damage ? draw_all_flaws(scene, {particles.id, particles.body}) : no_flaws(particles.size());
   std::vector<Vec3d> spins;
   for (const BodyParameters& body : scene.bodies) spins.push_back(body.spin);
   engine->insert(particles, flaws, spins);

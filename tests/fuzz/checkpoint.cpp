@@ -1,5 +1,7 @@
 // Checkpoint files up to where HDF5 opens them: the checksum finds every damage. The input is a file; with its checksum
 // made right it must be found whole, and damaged again once one of its bits is turned.
+#include "io/checkpoint.hpp"
+
 #include <unistd.h>
 #include <zlib.h>
 
@@ -8,7 +10,6 @@
 #include <fstream>
 #include <vector>
 
-#include "io/checkpoint.hpp"
 #include "io/checksum.hpp"
 #include "tests/fuzz/target.hpp"
 

@@ -180,8 +180,10 @@ TEST(Checkpoint, RunStatesThatAreNone) {
   EXPECT_NO_THROW(static_cast<void>(run_state_from(to_text(run))));
   const double nan = std::numeric_limits<double>::quiet_NaN();
   const std::vector<std::function<void(RunState&)>> changes{
-      [&](RunState& r) { r.loop.dt = nan; },       [](RunState& r) { r.loop.previous_dt = 0.0; },
-      [](RunState& r) { r.loop.time = -1.0; },     [](RunState& r) { r.loop.sort_interval = 0; },
+      [&](RunState& r) { r.loop.dt = nan; },
+      [](RunState& r) { r.loop.previous_dt = 0.0; },
+      [](RunState& r) { r.loop.time = -1.0; },
+      [](RunState& r) { r.loop.sort_interval = 0; },
       [](RunState& r) { r.output.rows.next = -1e300; },
   };
   for (std::size_t n = 0; n < changes.size(); ++n) {

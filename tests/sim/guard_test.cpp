@@ -1,5 +1,5 @@
-// Numbers that go wrong end the run on all ranks at once, with the particle (physics.md 8, cases 3 and 29). A checkpoint
-// is where a test can reach into a particle: it is taken, changed and continued.
+// Numbers that go wrong end the run on all ranks at once, with the particle (physics.md 8, cases 3 and 29). A
+// checkpoint is where a test can reach into a particle: it is taken, changed and continued.
 #include "sim/guard.hpp"
 
 #include <gtest/gtest.h>
@@ -28,8 +28,8 @@ Scene scene_with(std::vector<std::string> overrides) {
 
 // Bodies so thin that particles are alone; the step is stable for contacts of cells this small.
 Scene thin_scene(std::vector<std::string> overrides) {
-  overrides.insert(overrides.end(), {"grid.cell=1500 m", "time.step=0.0732421875 s", "body[0].particles=300",
-                                     "body[1].particles=300"});
+  overrides.insert(overrides.end(),
+                   {"grid.cell=1500 m", "time.step=0.0732421875 s", "body[0].particles=300", "body[1].particles=300"});
   return scene_with(std::move(overrides));
 }
 
