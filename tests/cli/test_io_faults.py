@@ -142,6 +142,14 @@ class IoFaults(CommandTest):
         self.assert_fails(process, 2, "grid.cell", "summary.json")
         self.assertEqual(hashes(self.out), before)
 
+    def test_killed_before_anything_was_written(self):
+        self.out.mkdir()
+        for name in ("probe", "probe.part", "snap_0000.hdf.part"):
+            (self.out / name).touch()
+        process = self.run_scene("--restart", "auto", "--steps", 1)
+        self.assertEqual(process.returncode, 0, process.stderr)
+        self.assertFalse([path for path in self.out.iterdir() if path.name.startswith("probe")])
+
     def test_checkpoint_that_cannot_be_removed(self):
         """A folder of that name: neither to be read nor to be removed, and no reason to stop."""
         self.out.mkdir()
