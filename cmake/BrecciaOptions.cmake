@@ -1,5 +1,6 @@
 # What a user may choose, and the flags every target shares.
 option(BRECCIA_TESTS "Build the tests" ON)
+option(BRECCIA_FUZZ "Build the libFuzzer targets of tests/fuzz (needs clang)" OFF)
 option(BRECCIA_CUDA "Compile the physics for CUDA devices too (needs nvcc; a check, there is no CUDA engine yet)" OFF)
 set(BRECCIA_SANITIZE "" CACHE STRING "Sanitizers for every target, e.g. address,undefined")
 set(BRECCIA_ISAS "x86-64-v2;x86-64-v3;x86-64-v4" CACHE STRING

@@ -19,18 +19,17 @@ struct StateColumn {
   std::vector<std::byte> values;  ///< particle after particle, its components together
 };
 
-/// Particles stand in storage order: a continued run adds in the same order as one that was not interrupted.
+/// Particles stand in storage order: a continued run adds in the same order as one that was not interrupted. Thresholds
+/// of flaws are not here: they follow from the scene and the ids.
 struct EngineState {
-  std::uint64_t particles = 0;            ///< of this rank
-  std::vector<std::int32_t> node;         ///< nearest grid node, 3 per particle, global
-  std::vector<StateColumn> columns;       ///< all fields that the run's effects need
-  std::vector<std::uint32_t> flaw_count;  ///< thresholds of each particle; empty where damage does not grow
-  std::vector<float> flaw_thresholds;     ///< particle after particle, rising
-  bool damage_finished = false;           ///< every particle has D = 1: the fields of damage are gone
-  double smallest_mass = 0.0;             ///< of all particles at the start [kg]
-  int slab_axis = 0;                      ///< axis the grid is cut along
-  std::vector<std::int32_t> slab_cuts;    ///< first block plane of each rank but rank 0
-  bool same_ranks = true;                 ///< taken on as many ranks: slabs and shares are to be kept
+  std::uint64_t particles = 0;          ///< of this rank
+  std::vector<std::int32_t> node;       ///< nearest grid node, 3 per particle, global
+  std::vector<StateColumn> columns;     ///< all fields that the run's effects need
+  bool damage_finished = false;         ///< every particle has D = 1: the fields of damage are gone
+  double smallest_mass = 0.0;           ///< of all particles at the start [kg]
+  int slab_axis = 0;                    ///< axis the grid is cut along
+  std::vector<std::int32_t> slab_cuts;  ///< first block plane of each rank but rank 0
+  bool same_ranks = true;               ///< taken on as many ranks: slabs and shares are to be kept
 };
 
 }  // namespace breccia

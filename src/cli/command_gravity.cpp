@@ -12,6 +12,7 @@
 #include "cli/json_output.hpp"
 #include "gravity/solver.hpp"
 #include "gravity/verify.hpp"
+#include "io/foreign_file.hpp"
 #include "io/hdf5.hpp"
 #include "scene/units.hpp"
 
@@ -95,6 +96,7 @@ std::uint64_t count_particles(const io::h5::File& file, const std::string& path)
 }
 
 Particles read(const std::string& path, const mpi::Comm& comm) {
+  io::require_harmless(path, comm);
   const io::h5::File file = io::h5::File::open(path, comm);
   Particles p;
   p.all = count_particles(file, path);

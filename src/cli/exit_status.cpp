@@ -39,8 +39,10 @@ Outcome outcome_of(const std::function<void()>& command) {
 }
 
 void print_error(const Outcome& outcome, int rank) {
+  // Errors quote what they were given: it must not break the line, nor do more to a terminal than be shown.
   std::string line = outcome.message;
-  std::replace(line.begin(), line.end(), '\n', ' ');
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7f; }, ' ');
   const std::string where = rank == 0 ? "" : fmt::format("rank {}: ", rank);
   std::fflush(stdout);
   // To stop when told so is no error.

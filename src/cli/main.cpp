@@ -1,3 +1,4 @@
+#include <csignal>
 #include <iostream>
 #include <string>
 
@@ -39,6 +40,8 @@ void run_command_line(int argc, char** argv, const mpi::Comm& comm) {
 }  // namespace breccia::cli
 
 int main(int argc, char** argv) {
+  // A file that may not grow is an error of input and output like a full disk, not the end without a word.
+  std::signal(SIGXFSZ, SIG_IGN);
   const breccia::mpi::Environment environment(&argc, &argv);
   const breccia::mpi::Comm comm;
   return breccia::cli::exit_status([&] { breccia::cli::run_command_line(argc, argv, comm); }, comm);

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -28,11 +29,37 @@ struct EngineSetup {
   int threads = 1;
 };
 
+/// What tells how a particle is.
+struct ParticleValues {
+  Vec3d velocity{};           ///< [m/s]
+  double volume_ratio = 1.0;  ///< J
+  double energy = 0.0;        ///< specific internal [J/kg]
+  double pressure = 0.0;      ///< J P [Pa]
+  double damage = 0.0;        ///< D
+};
+
+/// One particle as it stands.
+struct ParticleSample {
+  std::uint64_t id = 0;
+  Vec3d position{};  ///< [m]
+  ParticleValues values;
+};
+
+/// A particle that a pass could not take on. It was left as it was before and gives nothing to the grid any more: the
+/// run has to end.
+struct ParticleFault {
+  ParticleSample before;
+  ParticleValues after;
+  bool finite = false;  ///< false: not finite; true: it moved a cell or more in one step
+};
+
 /// Sums of a pass over this rank's particles.
 struct PassReport {
   double plastic_work = 0.0;  ///< [J]
   double viscous_work = 0.0;  ///< [J]
   double largest_move = 0.0;  ///< [cells]
+  std::uint64_t clamped = 0;  ///< particles whose volume change was cut: det(I + dt L) <= 0.1 (hard case 3)
+  std::optional<ParticleFault> fault;
 };
 
 /// Fastest signals over all ranks, for the time step.
@@ -64,9 +91,10 @@ class Engine {
 
   /// The whole state, only between sort() and the scatter() that follows.
   [[nodiscard]] virtual EngineState save() const = 0;
-  /// Takes a saved state in place of insert(): a scatter() that follows gives the same bits as after save(), if the
-  /// state comes from as many ranks. Collective. Throws IoError if a field is missing.
-  virtual void restore(const EngineState& state) = 0;
+  /// Takes a saved state in place of insert(), with the flaws that its particles were inserted with (empty lists if
+  /// damage does not grow): a scatter() that follows gives the same bits as after save(), if the state comes from as
+  /// many ranks. Collective. Throws IoError if a field is missing.
+  virtual void restore(const EngineState& state, const material::FlawLists& flaws) = 0;
 
   /// Sorts particles into tiles, sends those that left the slab to their owner, rebuilds blocks and halo. Only between
   /// gather() and scatter(). Collective.
@@ -91,6 +119,13 @@ class Engine {
 
   /// Everything at t_n, after update_grid(): velocities are the mean of v^{n-1/2} and v^{n+1/2}.
   [[nodiscard]] virtual ParticleOutput observe() const = 0;
+  /// The same at any moment and without the grid: velocities are v^{n-1/2}, there is no grid density.
+  [[nodiscard]] virtual ParticleOutput inspect() const = 0;
+  /// True if a particle of this rank has moved more than a cell since the last sorting: sort() cannot go on from there.
+  [[nodiscard]] virtual bool strayed() const = 0;
+  /// The particle of this rank that has left the margin of its tile, or is faster than all others; none on a rank
+  /// without particles.
+  [[nodiscard]] virtual std::optional<ParticleSample> fastest() const = 0;
   /// J of each particle in the order of observe(), and the elastic shear energy of this rank [J].
   [[nodiscard]] virtual std::vector<double> volume_ratios() const = 0;
   [[nodiscard]] virtual double elastic_energy() const = 0;

@@ -43,7 +43,7 @@ class HostEngine final : public Engine {
   void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
               std::span<const Vec3d> spin_of_body) override;
   [[nodiscard]] EngineState save() const override;
-  void restore(const EngineState& state) override;
+  void restore(const EngineState& state, const material::FlawLists& flaws) override;
   void sort() override;
   void scatter(double half_step) override;
   void update_grid(double kick) override;
@@ -53,6 +53,9 @@ class HostEngine final : public Engine {
   void hold_gravity(std::span<const Vec3d> acceleration) override;
   void kick_velocities(double time) override;
   [[nodiscard]] ParticleOutput observe() const override;
+  [[nodiscard]] ParticleOutput inspect() const override;
+  [[nodiscard]] bool strayed() const override { return strayed_packs_ != 0 || lone_strayed(); }
+  [[nodiscard]] std::optional<ParticleSample> fastest() const override;
   [[nodiscard]] std::vector<double> volume_ratios() const override;
   [[nodiscard]] double elastic_energy() const override;
   [[nodiscard]] SignalSpeeds signal_speeds() const override;
@@ -68,6 +71,7 @@ class HostEngine final : public Engine {
   PassArguments<P> pass_arguments(double step, double half_step);
   NodeArguments<P> node_arguments(double kick);
   void run_pass(const PassArguments<P>& arguments, const NodeArguments<P>* trailing = nullptr);
+  void report_fault();
   void run_task(const SweepTask& task, const PassArguments<P>& arguments, const NodeArguments<P>* trailing,
                 std::vector<TileReport>& reports) const;
 
@@ -90,7 +94,11 @@ class HostEngine final : public Engine {
 
   // Of a checkpoint (host_engine_checkpoint.cpp).
   void save_flaws(std::span<const Placement> placements, EngineState& state) const;
-  void restore_flaws(const EngineState& state);
+  std::vector<Placement> restore_places(const EngineState& state);
+  void restore_field(const FieldDescriptor& field, const EngineState& state);
+  void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
+  // The flaws of list `row` become those of `slot`; the first `active` of them grow already.
+  void set_flaws(std::size_t slot, const material::FlawLists& flaws, std::size_t row, std::uint32_t active);
 
   [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
 
@@ -103,6 +111,13 @@ class HostEngine final : public Engine {
     }
     for (std::uint32_t n = 0; n < lone_.particles; ++n) visit(lone_.first_pack * kLanes + n, lone_block_[n]);
   }
+  // Of an observation: what the grid says of each slot; empty vectors without a grid.
+  struct GridView {
+    std::vector<Real> new_velocity, node_mass;
+  };
+  [[nodiscard]] GridView probe() const;
+  [[nodiscard]] ParticleOutput read_particles(const GridView& grid) const;
+  [[nodiscard]] ParticleSample sample(std::size_t slot, BlockCoord block) const;
   [[nodiscard]] Vec3d position(std::size_t slot, BlockCoord block) const;
   [[nodiscard]] std::uint64_t id(std::size_t slot) const;
   [[nodiscard]] std::uint32_t material(std::size_t slot) const;
@@ -142,6 +157,7 @@ class HostEngine final : public Engine {
   mpi::Slabs slabs_;
   mpi::Halo<Real, kChannels> halo_;
   PassReport report_;
+  PassFault fault_;  // of the last pass
 };
 
 extern template class HostEngine<MixedPrecision>;

@@ -7,14 +7,15 @@
 
 #include "breccia/error.hpp"
 #include "grid/host_engine.hpp"
+#include "mpi/together.hpp"
 
 namespace breccia::grid {
 namespace {
 
-// Nodes are saved as global ones, flaws apart from their place in the arena of a rank.
+// Nodes are saved as global ones, of the flaws only how many grow: the rest follows from their thresholds.
 bool saved_as_it_is(const FieldDescriptor& field) {
   const std::string name = field.name;
-  return name != "node" && name != "flaw_first" && name != "flaw_count";
+  return name != "node" && name != "flaw_first" && name != "flaw_count" && name != "next_threshold";
 }
 
 constexpr const char* kActiveFlaws = "flaws_active";
@@ -40,6 +41,13 @@ const StateColumn& find_column(const EngineState& state, const std::string& name
     throw IoError("the checkpoint's field " + name + " has another size than this run needs");
   }
   return *found;
+}
+
+void require_slabs(const EngineState& state, int ranks) {
+  const bool cut_for_all = !state.same_ranks || state.slab_cuts.size() + 1 == static_cast<std::size_t>(ranks);
+  if (state.slab_axis < 0 || state.slab_axis > 2 || !cut_for_all || !std::ranges::is_sorted(state.slab_cuts)) {
+    throw IoError("the checkpoint has slabs that are none");
+  }
 }
 
 }  // namespace
@@ -81,37 +89,22 @@ void HostEngine<P>::save_flaws(std::span<const Placement> placements, EngineStat
     const auto growing = static_cast<std::uint32_t>(f.count[lane] & 0xffff);
     const auto* bytes = reinterpret_cast<const std::byte*>(&growing);
     active.values.insert(active.values.end(), bytes, bytes + sizeof growing);
-    const std::int32_t all = f.count[lane] >> 16;
-    state.flaw_count.push_back(static_cast<std::uint32_t>(all));
-    const auto first = flaw_thresholds_.begin() + f.first[lane];
-    state.flaw_thresholds.insert(state.flaw_thresholds.end(), first, first + all);
   }
   state.columns.push_back(std::move(active));
 }
 
 template <class P>
-void HostEngine<P>::restore(const EngineState& state) {
+void HostEngine<P>::restore(const EngineState& state, const material::FlawLists& flaws) {
   if (state.damage_finished && setup_.effects.damage) switch_damage_off();
-  store_.allocate((state.particles + kLanes - 1) / kLanes);
-  std::vector<Placement> placements(state.particles);
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    placements[i].slot = static_cast<std::uint32_t>(i);
-    std::copy_n(state.node.data() + 3 * i, 3, std::begin(placements[i].node));
-  }
-  for (const FieldDescriptor& field : fields<P>()) {
-    if (!store_.has(field.group) || !saved_as_it_is(field)) continue;
-    const auto element = static_cast<std::size_t>(field.element_bytes);
-    const auto components = static_cast<std::size_t>(field.components);
-    const std::byte* from = find_column(state, field.name, element, components).values.data();
-    std::byte* const packs = store_.data(field.group) + field.offset;
-    const std::size_t stride = ParticleStore<P>::stride(field.group);
-    for (std::size_t i = 0; i < placements.size(); ++i) {
-      std::byte* to = packs + i / kLanes * stride + i % kLanes * element;
-      for (std::size_t c = 0; c < components; ++c, from += element)
-        std::memcpy(to + c * kLanes * element, from, element);
+  std::vector<Placement> placements;
+  mpi::together<IoError>(comm_, [&] {
+    require_slabs(state, comm_.size());
+    placements = restore_places(state);
+    for (const FieldDescriptor& field : fields<P>()) {
+      if (store_.has(field.group) && saved_as_it_is(field)) restore_field(field, state);
     }
-  }
-  if (store_.has(Group::kFlaws)) restore_flaws(state);
+    if (store_.has(Group::kFlaws)) restore_flaws(state, flaws);
+  });
   smallest_mass_ = state.smallest_mass;
   if (state.same_ranks) {
     slabs_ = mpi::Slabs(state.slab_axis, state.slab_cuts);
@@ -123,18 +116,44 @@ void HostEngine<P>::restore(const EngineState& state) {
 }
 
 template <class P>
-void HostEngine<P>::restore_flaws(const EngineState& state) {
-  const std::byte* active = find_column(state, kActiveFlaws, 4, 1).values.data();
-  flaw_thresholds_ = state.flaw_thresholds;
-  std::size_t first = 0;
+std::vector<Placement> HostEngine<P>::restore_places(const EngineState& state) {
+  store_.allocate((state.particles + kLanes - 1) / kLanes);
+  std::vector<Placement> placements(state.particles);
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    placements[i].slot = static_cast<std::uint32_t>(i);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::int32_t node = state.node[3 * i + axis];
+      const std::int32_t block = node >> 2;
+      if (block > kBlockLimit || block < -kBlockLimit || periodicity_.wrap(block, static_cast<int>(axis)) != block) {
+        throw IoError("the checkpoint has a particle outside the grid");
+      }
+      placements[i].node[axis] = node;
+    }
+  }
+  return placements;
+}
+
+template <class P>
+void HostEngine<P>::restore_field(const FieldDescriptor& field, const EngineState& state) {
+  const auto element = static_cast<std::size_t>(field.element_bytes);
+  const auto components = static_cast<std::size_t>(field.components);
+  const std::byte* from = find_column(state, field.name, element, components).values.data();
+  std::byte* const packs = store_.data(field.group) + field.offset;
+  const std::size_t stride = ParticleStore<P>::stride(field.group);
   for (std::size_t i = 0; i < state.particles; ++i) {
-    Flaws<P>& f = store_.flaws[i / kLanes];
-    const int lane = static_cast<int>(i % kLanes);
-    std::int32_t growing = 0;
+    std::byte* to = packs + i / kLanes * stride + i % kLanes * element;
+    for (std::size_t c = 0; c < components; ++c, from += element) std::memcpy(to + c * kLanes * element, from, element);
+  }
+}
+
+template <class P>
+void HostEngine<P>::restore_flaws(const EngineState& state, const material::FlawLists& flaws) {
+  const std::byte* active = find_column(state, kActiveFlaws, 4, 1).values.data();
+  flaw_thresholds_ = flaws.threshold;
+  for (std::size_t i = 0; i < state.particles; ++i) {
+    std::uint32_t growing = 0;
     std::memcpy(&growing, active + i * sizeof growing, sizeof growing);
-    f.first.set(lane, static_cast<std::int32_t>(first));
-    f.count.set(lane, growing | static_cast<std::int32_t>(state.flaw_count[i]) << 16);
-    first += state.flaw_count[i];
+    set_flaws(i, flaws, i, growing);
   }
 }
 

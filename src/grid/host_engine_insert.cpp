@@ -64,10 +64,7 @@ void HostEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
       store_.damage_level[pack].root.set(lane, static_cast<Real>(std::cbrt(particles.damage[i])));
     }
     if (store_.has(Group::kFlaws)) {
-      const auto all = static_cast<std::int32_t>(std::min<std::size_t>(flaws.of(i).size(), 0x7fff));
-      store_.flaws[pack].first.set(lane, static_cast<std::int32_t>(flaws.first[i]));
-      store_.flaws[pack].count.set(lane, all << 16);
-      store_.flaws[pack].next_threshold.set(lane, all > 0 ? static_cast<Real>(flaws.of(i)[0]) : Real(1e30));
+      set_flaws(i, flaws, i, 0);
     }
     // C of a rigid rotation: v = spin x r.
     const Vec3d w = spin_of_body[particles.body[i]];
@@ -79,6 +76,18 @@ void HostEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
   }
   smallest_mass_ = comm_.min(lightest);
   settle(std::move(placements));
+}
+
+template <class P>
+void HostEngine<P>::set_flaws(std::size_t slot, const material::FlawLists& flaws, std::size_t row,
+                              std::uint32_t active) {
+  const auto all = static_cast<std::uint32_t>(std::min<std::size_t>(flaws.of(row).size(), 0x7fff));
+  if (active > all) throw IoError("more flaws grow than the particle has");
+  Flaws<P>& f = store_.flaws[slot / kLanes];
+  const int lane = static_cast<int>(slot % kLanes);
+  f.first.set(lane, static_cast<std::int32_t>(flaws.first[row]));
+  f.count.set(lane, static_cast<std::int32_t>(active | all << 16));
+  f.next_threshold.set(lane, active < all ? static_cast<Real>(flaws.of(row)[active]) : Real(1e30));
 }
 
 template class HostEngine<MixedPrecision>;

@@ -34,17 +34,16 @@ std::uint32_t HostEngine<P>::material(std::size_t slot) const {
 }
 
 template <class P>
-ParticleOutput HostEngine<P>::observe() const {
-  std::vector<Real> new_velocity(store_.packs() * kLanes * 3);
-  std::vector<Real> node_mass(store_.packs() * kLanes);
+typename HostEngine<P>::GridView HostEngine<P>::probe() const {
+  GridView grid{std::vector<Real>(store_.packs() * kLanes * 3), std::vector<Real>(store_.packs() * kLanes)};
   ProbeArguments<P> probe;
   probe.tiles = tiles_.data();
   probe.boxes = boxes_.data();
   probe.kinematics = store_.kinematics.data();
   probe.velocities = velocities_.data();
   probe.transfer = transfer_;
-  probe.new_velocity = new_velocity.data();
-  probe.node_mass = node_mass.data();
+  probe.new_velocity = grid.new_velocity.data();
+  probe.node_mass = grid.node_mass.data();
   probe.lone = lone_;
   probe.gravity = setup_.self_gravity ? store_.gravity.data() : nullptr;
   probe.uniform_gravity = {static_cast<Real>(setup_.uniform_gravity.x), static_cast<Real>(setup_.uniform_gravity.y),
@@ -52,7 +51,21 @@ ParticleOutput HostEngine<P>::observe() const {
   probe.kick = static_cast<Real>(kick_);
   for (std::uint32_t t = 0; t < tiles_.size(); ++t) kernels_.probe(probe, t);
   kernels_.lone_probe(probe);
+  return grid;
+}
 
+template <class P>
+ParticleOutput HostEngine<P>::observe() const {
+  return read_particles(probe());
+}
+
+template <class P>
+ParticleOutput HostEngine<P>::inspect() const {
+  return read_particles({});
+}
+
+template <class P>
+ParticleOutput HostEngine<P>::read_particles(const GridView& grid) const {
   const material::RuntimeEffects& fx = setup_.effects;
   const double cell_volume = setup_.cell * setup_.cell * setup_.cell;
   ParticleOutput out;
@@ -63,8 +76,9 @@ ParticleOutput HostEngine<P>::observe() const {
     const MaterialParameters& parameters = setup_.materials[material(slot)];
     const double ratio = 1.0 + static_cast<double>(store_.volume[pack].change.value()[lane]);
     const auto mean = [&](int axis) {
-      return 0.5 * (static_cast<double>(k.velocity[axis][lane]) +
-                    static_cast<double>(new_velocity[3 * slot + static_cast<std::size_t>(axis)]));
+      const auto old = static_cast<double>(k.velocity[axis][lane]);
+      if (grid.new_velocity.empty()) return old;
+      return 0.5 * (old + static_cast<double>(grid.new_velocity[3 * slot + static_cast<std::size_t>(axis)]));
     };
     out.id.push_back(id(slot));
     out.position.push_back(position(slot, block));
@@ -73,7 +87,7 @@ ParticleOutput HostEngine<P>::observe() const {
     out.body.push_back(static_cast<std::uint32_t>(store_.identity[pack].body_material[lane]) & 0xffffU);
     out.material.push_back(material(slot));
     out.density.push_back(parameters.eos.rho0 / ratio);
-    out.grid_density.push_back(static_cast<double>(node_mass[slot]) / cell_volume);
+    if (!grid.node_mass.empty()) out.grid_density.push_back(static_cast<double>(grid.node_mass[slot]) / cell_volume);
     out.pressure.push_back(static_cast<double>(store_.volume[pack].kirchhoff_pressure[lane]) / ratio);
     double damage = fx.fully_damaged ? 1.0 : 0.0;
     if (store_.has(Group::kDamageLevel)) {

@@ -7,6 +7,7 @@
 
 #include "breccia/error.hpp"
 #include "grid/host_engine.hpp"
+#include "mpi/together.hpp"
 
 namespace breccia::grid {
 namespace {
@@ -61,12 +62,10 @@ std::vector<Placement> HostEngine<P>::place_all() const {
 
 template <class P>
 void HostEngine<P>::sort() {
-  if (comm_.any(strayed_packs_ != 0 || lone_strayed())) {
-    throw NumericsError(
-        "particles moved more than a cell between two sortings, or are not finite: the run is unstable (try a smaller "
-        "time.step), or numerics.sort_interval is too long for its speeds");
-  }
-  settle(place_all());
+  if (comm_.any(strayed())) throw NumericsError("particles moved more than a cell between two sortings");
+  std::vector<Placement> placements;
+  mpi::together<NumericsError>(comm_, [&] { placements = place_all(); });
+  settle(std::move(placements));
 }
 
 template <class P>

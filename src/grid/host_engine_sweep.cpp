@@ -129,6 +129,7 @@ template <class P>
 void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArguments<P>* trailing) {
   constexpr std::uint32_t kChunk = 16;
   const auto lone_packs = static_cast<std::uint32_t>(lone_pull_.size());
+  fault_ = {};
   std::vector<TileReport> reports(tiles_.size());
   std::vector<TileReport> lone_reports((lone_packs + kChunk - 1) / kChunk);
 #pragma omp parallel num_threads(setup_.threads)
@@ -144,10 +145,12 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
     }
   }
   report_ = {};
+  if (fault_.slot != PassFault::kNone) report_fault();
   const auto book = [&](const TileReport& r) {
     report_.plastic_work += r.plastic_work;
     report_.viscous_work += r.viscous_work;
     report_.largest_move = std::max(report_.largest_move, r.largest_move);
+    report_.clamped += r.clamped;
     strayed_packs_ += r.strayed;
   };
   std::for_each(reports.begin(), reports.end(), book);

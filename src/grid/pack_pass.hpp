@@ -3,18 +3,10 @@
 // (window starts). Where the velocities come from and the momentum goes to is the business of `Grid`.
 #pragma once
 
+#include "grid/pack_fault.hpp"
 #include "grid/particle_pack.hpp"
 
 namespace breccia::grid {
-
-/// What a pack gives to the grid, lanes = particles.
-template <class P>
-struct PackStress {
-  using T = typename P::RealPack;
-  Mat3<T> gradient;  ///< C^{n-1/2} [1/s]
-  T volume;          ///< reference volume m / rho0 [m3]
-  Sym3<T> tau;       ///< Kirchhoff stress [Pa]
-};
 
 /// Acceleration of pack `i` by the held and the uniform gravity [m/s2]. Arguments: PassArguments or ProbeArguments.
 template <class P, class Arguments>
@@ -54,6 +46,8 @@ class PackPass {
     Kinematics<P> k = a_.kinematics[i];
     auto state = load_state(a_, fx_, i);
     PackStress<P> out;
+    material::Dissipation<T> lost{};
+    Real moved(0);
     if (a_.gather) {
       prefetch(a_.kinematics + i + 1);
       prefetch(a_.volume + i + 1);
@@ -61,24 +55,31 @@ class PackPass {
       if (fx_.shear) prefetch(a_.elastic + i + 1);
       if (fx_.energy) prefetch(a_.energy + i + 1);
       out.gradient = grid.gradient;
-      const Real moved = horizontal_max(advance(a_, k, grid));
+      moved = horizontal_max(advance(a_, k, grid));
       if (moved > report.largest_move) report.largest_move = moved;
+      T increment(Real(0));
       for_each_material(i, state, [&](const material::Constants<Real>& c, material::State<T>& s) BRECCIA_INLINE_LAMBDA {
-        material::update_strain(fx_, c, s, out.gradient, a_.step);
+        increment = material::update_strain(fx_, c, s, out.gradient, a_.step);
         if (fx_.damage) grow_damage(a_, i, k.mass, c, s);
       });
-      a_.kinematics[i] = k;
-      if (Grid::kKeepsGradient || !a_.scatter) store_gradient(i, out.gradient);
+      report.clamped += clamped_lanes<P>(increment, k.mass);
     } else {
       out.gradient = load_gradient(i);
     }
     if (a_.scatter) {
       if (fx_.damage) prefetch(a_.flaws + i + 1);
-      material::Dissipation<T> lost{};
       out.tau = {};
       for_each_material(i, state, [&](const material::Constants<Real>& c, material::State<T>& s) BRECCIA_INLINE_LAMBDA {
         stress(c, s, out.gradient, i, lost, out.tau);
       });
+    }
+    const T sum = sum_of_state<P>(k, state, out, a_.scatter);
+    if ((any_not_finite(sum) || moved >= Real(1)) && found_fault<P>(*a_.fault, i, lanes, moved, k, state, sum)) return;
+    if (a_.gather) {
+      a_.kinematics[i] = k;
+      if (Grid::kKeepsGradient || !a_.scatter) store_gradient(i, out.gradient);
+    }
+    if (a_.scatter) {
       out.volume = reference_volume(i, k.mass);
       report.plastic_work += static_cast<double>(horizontal_sum(out.volume * lost.plastic));
       report.viscous_work += static_cast<double>(horizontal_sum(out.volume * lost.viscous));

@@ -71,6 +71,20 @@ struct TileReport {
   double viscous_work = 0.0;  ///< [J]
   double largest_move = 0.0;  ///< largest |dx| along an axis [cells]
   std::uint32_t strayed = 0;  ///< particles found outside the margin
+  std::uint32_t clamped = 0;  ///< particles whose change of J was cut (hard case 3)
+};
+
+/// What would have become of the first particle a pass could not take on; its pack is left as it was before.
+struct PassFault {
+  static constexpr std::uint32_t kNone = 0xffffffffU;
+  std::uint32_t slot = kNone;       ///< pack * lanes + lane; the lowest of all
+  int lock = 0;                     ///< tiles of several threads may fail at once
+  bool finite = false;              ///< false: not finite; true: it moved a cell or more in one step
+  double velocity[3] = {};          ///< [m/s]
+  double volume_change = 0.0;       ///< J - 1
+  double energy = 0.0;              ///< [J/kg]
+  double kirchhoff_pressure = 0.0;  ///< J P [Pa]
+  double damage_root = 0.0;         ///< D^(1/3)
 };
 
 /// Velocity transfer (physics.md 5): d = alpha (v_p - v_old); v_p = v_new + d; x += dt (v_new + beta d).
@@ -104,6 +118,7 @@ struct PassArguments {
   Real* sums = nullptr;                    ///< [blocks][64][8], SumChannel
   RowMask* rows = nullptr;                 ///< [blocks] rows that a scatter has added to
   const float* flaw_thresholds = nullptr;  ///< arena of this rank
+  PassFault* fault = nullptr;
   const material::Constants<Real>* materials = nullptr;
   int material_count = 1;
   material::RuntimeEffects effects;

@@ -24,7 +24,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 1;
+constexpr std::int64_t kFormat = 2;
 constexpr std::string_view kPrefix = "checkpoint_";
 constexpr std::string_view kSuffix = ".h5";
 
@@ -46,12 +46,31 @@ void take_bits(StateColumn& column, const std::vector<T>& values) {
 
 std::uint64_t bytes_needed(const EngineState& state, const std::string& run, const mpi::Comm& comm) {
   constexpr std::uint64_t kTables = std::uint64_t{1} << 20;
-  std::uint64_t bytes = 4 * (state.node.size() + state.flaw_count.size() + state.flaw_thresholds.size());
+  std::uint64_t bytes = 4 * state.node.size();
   for (const StateColumn& column : state.columns) bytes += column.values.size();
   return comm.sum(bytes) + run.size() + kTables;
 }
 
-void write_column(h5::File& file, const StateColumn& column, std::uint64_t total, h5::Rows rows) {
+// Of the values as the engine had them: tells what came wrong onto the disk, and of which field, where the checksum of
+// the file only knows what became of it there.
+constexpr const char* kChecksum = "Checksum";
+
+void write_checksum(h5::File& file, const std::string& dataset, std::span<const std::byte> mine,
+                    const mpi::Comm& comm) {
+  file.write_attribute(dataset, kChecksum, static_cast<std::int64_t>(checksum_over_ranks(mine, comm)));
+}
+
+void require_checksum(const h5::File& file, const std::string& dataset, std::span<const std::byte> mine,
+                      const mpi::Comm& comm) {
+  std::int64_t written = -1;
+  file.read_attribute(dataset, kChecksum, written);
+  if (written != static_cast<std::int64_t>(checksum_over_ranks(mine, comm))) {
+    throw IoError(dataset + ": its checksum is wrong");
+  }
+}
+
+void write_column(h5::File& file, const StateColumn& column, std::uint64_t total, h5::Rows rows,
+                  const mpi::Comm& comm) {
   const std::string dataset = "/Particles/" + column.name;
   const h5::Layout layout{total, column.components, 0};
   if (column.element_bytes == 4) {
@@ -61,6 +80,7 @@ void write_column(h5::File& file, const StateColumn& column, std::uint64_t total
   }
   file.write_attribute(dataset, "Units", column.unit);
   file.write_attribute(dataset, "Description", column.meaning);
+  write_checksum(file, dataset, column.values, comm);
 }
 
 std::string text_of_root(const std::string& text, const mpi::Comm& comm) {
@@ -68,6 +88,11 @@ std::string text_of_root(const std::string& text, const mpi::Comm& comm) {
   std::vector<std::byte> message(bytes.begin(), bytes.end());
   comm.broadcast(message);
   return {reinterpret_cast<const char*>(message.data()), message.size()};
+}
+
+// The bytes of a text that all ranks hold, once.
+std::span<const std::byte> of_root(const std::string& text, const mpi::Comm& comm) {
+  return comm.is_root() ? std::as_bytes(std::span(text)) : std::span<const std::byte>();
 }
 
 void write_content(h5::File& file, const Checkpoint& checkpoint, const mpi::Comm& comm) {
@@ -78,16 +103,10 @@ void write_content(h5::File& file, const Checkpoint& checkpoint, const mpi::Comm
   std::vector<std::string> names;
   for (const StateColumn& column : state.columns) names.push_back(column.name);
   file.write_attribute("/Particles", "Fields", names);
-  for (const StateColumn& column : state.columns) write_column(file, column, total, rows);
+  for (const StateColumn& column : state.columns) write_column(file, column, total, rows, comm);
   file.write_rows("/Particles/node", {total, 3, 0}, rows, bits(state.node));
+  write_checksum(file, "/Particles/node", std::as_bytes(std::span(state.node)), comm);
 
-  const bool flaws = comm.any(!state.flaw_count.empty());
-  if (flaws) {
-    const std::uint64_t mine = state.flaw_thresholds.size();
-    file.write_rows("/Particles/flaw_count", {total, 1, 0}, rows, bits(state.flaw_count));
-    file.write_rows("/FlawThresholds", {comm.sum(mine), 1, 0}, {comm.exclusive_scan(mine), mine},
-                    bits(state.flaw_thresholds));
-  }
   file.create_group("/Engine");
   file.write_attribute("/Engine", "Format", kFormat);
   file.write_attribute("/Engine", "DamageFinished", std::int64_t{state.damage_finished});
@@ -99,7 +118,9 @@ void write_content(h5::File& file, const Checkpoint& checkpoint, const mpi::Comm
   const std::uint64_t cuts = state.slab_cuts.size();
   file.write_rows("/Engine/SlabCuts", {cuts, 1, 0}, {0, comm.is_root() ? cuts : 0}, bits(state.slab_cuts));
   // Another length on another rank would be another file to HDF5.
-  file.write_text("/Run", text_of_root(checkpoint.run, comm));
+  const std::string run = text_of_root(checkpoint.run, comm);
+  file.write_text("/Run", run);
+  write_checksum(file, "/Run", of_root(run, comm), comm);
 }
 
 // The rows of this rank: what it had, or an even share.
@@ -153,17 +174,11 @@ void read_engine(const h5::File& file, EngineState& state, const mpi::Comm& comm
   state.particles = rows.count;
   for (const std::string& name : file.read_attribute_texts("/Particles", "Fields")) {
     state.columns.push_back(read_column(file, name, total, rows));
+    require_checksum(file, "/Particles/" + name, state.columns.back().values, comm);
   }
   if (components_of(file, "/Particles/node", total) != 3) throw IoError("/Particles/node: unexpected shape");
   state.node = read_bits<std::int32_t>(file, "/Particles/node", rows, 3);
-  if (file.exists("/Particles/flaw_count")) {
-    state.flaw_count = read_bits<std::uint32_t>(file, "/Particles/flaw_count", rows, 1);
-    const std::uint64_t mine = std::accumulate(state.flaw_count.begin(), state.flaw_count.end(), std::uint64_t{0});
-    if (file.shape("/FlawThresholds") != std::vector{comm.sum(mine)}) {
-      throw IoError("/FlawThresholds: unexpected shape");
-    }
-    state.flaw_thresholds = read_bits<float>(file, "/FlawThresholds", {comm.exclusive_scan(mine), mine}, 1);
-  }
+  require_checksum(file, "/Particles/node", std::as_bytes(std::span(state.node)), comm);
   std::int64_t damage_finished = 0;
   std::int64_t axis = 0;
   file.read_attribute("/Engine", "DamageFinished", damage_finished);
@@ -201,7 +216,12 @@ void remove_other_checkpoints(const fs::path& folder, std::uint64_t newest, std:
     std::uint64_t kept = 0;
     for (const std::uint64_t number : numbers) {
       if (number > newest || kept == keep) {
-        fs::remove(folder / checkpoint_name(number));
+        // One that cannot be removed takes space, but is no reason to end a run.
+        std::error_code error;
+        fs::remove(folder / checkpoint_name(number), error);
+        if (error)
+          fmt::print(stderr, "breccia: warning: {}: cannot be removed: {}\n",
+                     (folder / checkpoint_name(number)).string(), error.message());
       } else {
         ++kept;
       }
@@ -221,11 +241,12 @@ Checkpoint read_checkpoint(const fs::path& path, const mpi::Comm& comm) {
   const h5::File file = h5::File::open(path, comm);
   try {
     read_engine(file, checkpoint.engine, comm);
+    checkpoint.run = file.read_text("/Run");
+    require_checksum(file, "/Run", of_root(checkpoint.run, comm), comm);
   } catch (const IoError& error) {
     const std::string what = error.what();
     throw IoError(what.starts_with(path.string()) ? what : fmt::format("{}: {}", path.string(), what));
   }
-  checkpoint.run = file.read_text("/Run");
   return checkpoint;
 }
 

@@ -43,13 +43,7 @@ Part part_of(const std::filesystem::path& path, std::uint64_t first, std::uint64
   return {crc, length};
 }
 
-// CRC-32 of the first `length` bytes, each rank reading a part.
-std::uint64_t crc_of(const std::filesystem::path& path, std::uint64_t length, const mpi::Comm& comm) {
-  const auto ranks = static_cast<std::uint64_t>(comm.size());
-  const auto rank = static_cast<std::uint64_t>(comm.rank());
-  const std::uint64_t share = length / ranks;
-  Part mine;
-  collectively(comm, [&] { mine = part_of(path, rank * share, rank + 1 == ranks ? length - rank * share : share); });
+std::uint64_t combined(const Part& mine, const mpi::Comm& comm) {
   uLong crc = crc32(0, nullptr, 0);
   for (const Part& part : comm.allgather(mine)) {
     crc = crc32_combine(crc, static_cast<uLong>(part.crc), static_cast<z_off_t>(part.length));
@@ -57,14 +51,33 @@ std::uint64_t crc_of(const std::filesystem::path& path, std::uint64_t length, co
   return crc;
 }
 
+// CRC-32 of the first `length` bytes, each rank reading a part.
+std::uint64_t crc_of(const std::filesystem::path& path, std::uint64_t length, const mpi::Comm& comm) {
+  const auto ranks = static_cast<std::uint64_t>(comm.size());
+  const auto rank = static_cast<std::uint64_t>(comm.rank());
+  const std::uint64_t share = length / ranks;
+  Part mine;
+  collectively(comm, [&] { mine = part_of(path, rank * share, rank + 1 == ranks ? length - rank * share : share); });
+  return combined(mine, comm);
+}
+
 // The root's size of the file, on all ranks.
 std::uint64_t size_of(const std::filesystem::path& path, const mpi::Comm& comm) {
   std::uint64_t size = 0;
-  on_root(comm, [&] { size = std::filesystem::file_size(path); });
+  on_root(comm, [&] {
+    std::error_code error;
+    size = std::filesystem::file_size(path, error);
+    if (error) throw IoError(fmt::format("{}: {}", path.string(), error.message()));
+  });
   return comm.max(size);
 }
 
 }  // namespace
+
+std::uint64_t checksum_over_ranks(std::span<const std::byte> mine, const mpi::Comm& comm) {
+  const uLong crc = crc32_z(crc32(0, nullptr, 0), reinterpret_cast<const Bytef*>(mine.data()), mine.size());
+  return combined({mine.empty() ? crc32(0, nullptr, 0) : crc, mine.size()}, comm);
+}
 
 void append_checksum(const std::filesystem::path& path, const mpi::Comm& comm) {
   Trailer trailer;

@@ -33,6 +33,7 @@ struct DiagnosticsRow {
   double max_speed = 0.0;
   double min_J = 0.0;
   double max_J = 0.0;
+  std::uint64_t clamped_volumes = 0;
   double damaged_fraction = 0.0;
   std::uint64_t active_blocks = 0;
   std::uint64_t particles_per_rank_min = 0;

@@ -35,16 +35,23 @@ double precision value back exactly.
 {diagnostics}
 ## `checkpoint_NNNN.h5`
 
-A checkpoint: everything a run needs to go on, bit for bit, in parallel HDF5 with a CRC-32 of the whole file behind its end.
-`/Particles` has the fields of the engine by their bits, in storage order; `/FlawThresholds` the strains at which flaws
-begin to grow, particle after particle; `/Engine` the slabs and the particles of each rank; `/Run` the rest as JSON. The
+A checkpoint: everything a run needs to go on, bit for bit, in parallel HDF5 with a CRC-32 of the whole file behind its end
+and, in the attribute `Checksum`, one of the values of each dataset as they were in memory.
+`/Particles` has the fields of the engine by their bits, in storage order (the flaws of the particles are drawn again
+from the scene); `/Engine` the slabs and the particles of each rank; `/Run` the rest as JSON. The
 newest `output.keep` stay. They are read by the version that wrote them, on any number of ranks; for results take snapshots.
+
+## `dump.hdf`, `dump.json`
+
+Left by a run that ended with exit code 3, the numbers having gone wrong: all particles as a snapshot, but with the
+velocities of half a step before and without `GridDensity`; and the error with the particle at fault, if there is one,
+before and after the step that broke it.
 
 ## `summary.json`
 
 Written at the end: `particles`, `steps`, `simulated_time` [s], `time_step` (the last) [s], `wall_seconds`, `ranks`, `threads`, `device`, `precision`,
 `particle_steps_per_second`; `conservation` with the drifts of `mass` (over the total mass), `momentum` (over sum m |v|),
-`angular_momentum` (over sum m |x cross v|) and `energy` (over max(kinetic + |potential|)); `damaged_fraction`; `remnants`,
+`angular_momentum` (over sum m |x cross v|) and `energy` (over max(kinetic + |potential|)); `damaged_fraction`; `clamped_volumes`; `remnants`,
 largest first; `stages` with the wall time of each stage of the step on the first rank, parts of gravity as `gravity: part` and also
 in `gravity`; `gravity` with `evaluations` of each method, `reason` and `boxes` of the last one, `pairs`,
 `cell_interactions`, `expansions`, `bytes_sent` of all ranks and `net_force`, the largest over sum m |a|; `versions`; `machine`; `scene`, every key as resolved;

@@ -39,6 +39,9 @@ struct Snapshot {
 void write_snapshot(const std::filesystem::path& path, const SnapshotHeader& header, const ParticleOutput& particles,
                     std::span<const std::string> wanted_fields, const mpi::Comm& comm);
 
+/// The scene's name in a snapshot; empty if there is none. Not collective. Throws IoError.
+std::string scene_name_in(const std::filesystem::path& path);
+
 /// Reads a snapshot, or any file with /PartType0/Coordinates (N,3) and /PartType0/Masses (N); each rank gets a
 /// contiguous share of the rows. Missing velocities, bodies, materials and damage are 0, missing ids are row numbers,
 /// other missing fields stay empty. Collective. Throws IoError naming file and dataset, the same on all ranks.

@@ -8,6 +8,7 @@
 #include "io/by_id.hpp"
 #include "io/collectively.hpp"
 #include "io/fields.hpp"
+#include "io/foreign_file.hpp"
 #include "io/hdf5.hpp"
 #include "io/snapshot.hpp"
 
@@ -111,8 +112,15 @@ void fill_missing(ParticleOutput& particles, h5::Rows rows) {
 
 }  // namespace
 
+std::string scene_name_in(const std::filesystem::path& path) {
+  const mpi::Comm self(MPI_COMM_SELF);
+  require_harmless(path, self);
+  return read_header(h5::File::open(path, self)).scene_name;
+}
+
 Snapshot read_snapshot(const std::filesystem::path& path, const mpi::Comm& comm) {
   on_root(comm, [&] { require_hdf5(path); });
+  require_harmless(path, comm);
   const h5::File file = h5::File::open(path, comm);
   Snapshot snapshot;
   snapshot.header = read_header(file);

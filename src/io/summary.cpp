@@ -75,6 +75,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["particle_steps_per_second"] = particle_steps_per_second(summary);
   json["conservation"] = conservation_json(summary.conservation);
   json["damaged_fraction"] = summary.damaged_fraction;
+  json["clamped_volumes"] = summary.clamped_volumes;
   json["remnants"] = summary.remnants;
   json["stages"] = stages_json(summary.stages);
   json["gravity"] = summary.gravity;

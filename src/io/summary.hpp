@@ -40,6 +40,7 @@ struct RunSummary {
   std::string precision;        ///< "mixed" or "double"
   Conservation conservation;
   double damaged_fraction = 0.0;                      ///< mass-weighted mean of D
+  std::uint64_t clamped_volumes = 0;                  ///< volume changes that were cut (hard case 3)
   nlohmann::json remnants = nlohmann::json::array();  ///< largest first (remnants_json.hpp)
   std::vector<StageTiming> stages;
   nlohmann::json gravity;                ///< what its evaluations came to; null without self-gravity

@@ -156,10 +156,10 @@ BRECCIA_HD Sym3<T> update_stress(Fx fx, const Constants<R>& k, State<T>& state, 
 /// Step 6 of physics.md 5, after the transfer from the grid: adds the first half of the stress work,
 /// step/2 * tau^n : d^{n+1/2} / rho0, with tau^n rebuilt from the stored elastic strain and J P, and carries the
 /// elastic strain, J and (while damage is on and D < 1) the total strain along with I + A, A = step *
-/// velocity_gradient.
+/// velocity_gradient. Returns det(I + A) - 1; below kLeastVolumeIncrement the change of J was cut (hard case 3).
 template <class Fx, class R, class T>
-BRECCIA_HD void update_strain(Fx fx, const Constants<R>& k, State<T>& state, const Mat3<T>& velocity_gradient,
-                              scalar_of<T> step) {
+BRECCIA_HD T update_strain(Fx fx, const Constants<R>& k, State<T>& state, const Mat3<T>& velocity_gradient,
+                           scalar_of<T> step) {
   const T zero(R(0));
   if (fx.energy) {
     Dev3<T> s{zero, zero, zero, zero, zero};
@@ -174,7 +174,9 @@ BRECCIA_HD void update_strain(Fx fx, const Constants<R>& k, State<T>& state, con
     const T kept = select(state.damage_root < T(R(1)), T(R(1)), zero);
     state.total = kept * carry(a, state.total);
   }
-  change_volume(state.volume, volume_increment(a), T(k.volume_change_max));
+  const T increment = volume_increment(a);
+  change_volume(state.volume, increment, T(k.volume_change_max));
+  return increment;
 }
 
 /// Longitudinal wave speed [m/s] for the adaptive time step: sqrt(c^2 + 4/3 mu / rho0), the bulk c^2 of the equation

@@ -8,6 +8,7 @@ namespace breccia::material {
 
 /// Least factor by which J may shrink in one step: a step with det(I + A) <= 0 has no meaning (hard case 3).
 inline constexpr double kLeastVolumeRatio = 0.1;
+inline constexpr double kLeastVolumeIncrement = kLeastVolumeRatio - 1.0;
 /// Least J, so that repeated such steps cannot overflow the equation of state.
 inline constexpr double kLeastVolume = 1.0e-3;
 
@@ -28,7 +29,7 @@ template <class T>
 BRECCIA_HD void change_volume(Accumulator<T>& volume_change, T increment, T volume_change_max) {
   using R = scalar_of<T>;
   const T j = volume_change.value();
-  const T ratio = max(increment, T(R(kLeastVolumeRatio - 1.0)));
+  const T ratio = max(increment, T(R(kLeastVolumeIncrement)));
   const T change = ratio + j * ratio;
   volume_change.add(min(max(change, T(R(kLeastVolume - 1.0)) - j), volume_change_max - j));
 }

@@ -25,16 +25,27 @@ constexpr bool kHaveV2 = true;
 constexpr bool kHaveV2 = false;
 #endif
 
+// clang 16 knows no levels, but features: those that a processor of the level got last.
+#ifdef __clang__
+bool processor_has_v4() { return __builtin_cpu_supports("avx512vl") && __builtin_cpu_supports("avx512dq"); }
+bool processor_has_v3() { return __builtin_cpu_supports("avx2") && __builtin_cpu_supports("fma"); }
+bool processor_has_v2() { return __builtin_cpu_supports("sse4.2"); }
+#else
+bool processor_has_v4() { return __builtin_cpu_supports("x86-64-v4") != 0; }
+bool processor_has_v3() { return __builtin_cpu_supports("x86-64-v3") != 0; }
+bool processor_has_v2() { return __builtin_cpu_supports("x86-64-v2") != 0; }
+#endif
+
 }  // namespace
 
 bool available(Isa isa) {
   switch (isa) {
     case Isa::kV4:
-      return kHaveV4 && __builtin_cpu_supports("x86-64-v4") != 0;
+      return kHaveV4 && processor_has_v4();
     case Isa::kV3:
-      return kHaveV3 && __builtin_cpu_supports("x86-64-v3") != 0;
+      return kHaveV3 && processor_has_v3();
     case Isa::kV2:
-      return kHaveV2 && __builtin_cpu_supports("x86-64-v2") != 0;
+      return kHaveV2 && processor_has_v2();
   }
   return false;
 }

@@ -28,6 +28,7 @@ enum Sum {
   kElastic,
   kPlastic,
   kViscous,
+  kClamped,
   kGravity,
   kDamaged,
   kMomentumScale,
@@ -74,6 +75,7 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
   s[kElastic] = engine.elastic_energy();
   s[kPlastic] = lost.plastic;
   s[kViscous] = lost.viscous;
+  s[kClamped] = static_cast<double>(lost.clamped);
   s[kParticles] = static_cast<double>(p.size());
   s[kBlocks] = static_cast<double>(engine.stats().blocks);
   comm_.sum(std::span<double>(s));
@@ -94,6 +96,7 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
   row.elastic_energy = s[kElastic];
   row.plastic_energy = s[kPlastic];
   row.viscous_energy = s[kViscous];
+  row.clamped_volumes = static_cast<std::uint64_t>(s[kClamped]);
   row.gravitational_energy = s[kGravity];
   row.max_speed = comm_.max(max_speed);
   row.min_J = comm_.min(ratios.empty() ? HUGE_VAL : *low);
@@ -110,12 +113,13 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
     return r.kinetic_energy + r.internal_energy + r.gravitational_energy;
   };
   row.energy_residual = total(row) - total(state_.first);
-  check(row);
+  require_sums(row);
   follow(row, s[kMomentumScale], s[kAngularScale]);
+  require_no_gain(row);
   return row;
 }
 
-void Budget::check(const io::DiagnosticsRow& row) const {
+void Budget::require_sums(const io::DiagnosticsRow& row) const {
   if (!std::isfinite(row.kinetic_energy + row.internal_energy + row.elastic_energy + row.min_J + row.max_J)) {
     throw NumericsError("a particle is not finite any more: the run is unstable; try a smaller time.step or time.cfl");
   }
@@ -125,6 +129,21 @@ void Budget::check(const io::DiagnosticsRow& row) const {
   if (std::abs(row.mass - state_.first.mass) > 1e-12 * state_.first.mass) {
     throw NumericsError(fmt::format("total mass {:.17g} kg, but {:.17g} kg at the start", row.mass, state_.first.mass));
   }
+}
+
+void Budget::require_no_gain(const io::DiagnosticsRow& row) const {
+  // Bodies at rest have no scale but this one: a few mm/s of noise.
+  constexpr double kNoise = 1e-5;  // [J/kg]
+  const double scale = state_.energy_scale + kNoise * row.mass;
+  // Motion that grows on an internal energy far below zero is a gain as well.
+  const double gain = std::max(row.energy_residual, state_.first.internal_energy - row.internal_energy);
+  if (gain <= energy_gain_ * scale) return;
+  const char* const what = gain == row.energy_residual ? "the total energy rose" : "motion took internal energy away";
+  throw NumericsError(fmt::format(
+      "{} by {:.6g} J since the start, {:.3g} of the largest kinetic + |potential| energy (allowed: {:.3g}, "
+      "numerics.energy_gain); kinetic {:.6g} J, internal {:.6g} J, gravitational {:.6g} J; the run is "
+      "unstable: try a smaller time.step or time.cfl",
+      what, gain, gain / scale, energy_gain_, row.kinetic_energy, row.internal_energy, row.gravitational_energy));
 }
 
 void Budget::follow(const io::DiagnosticsRow& row, double momentum_scale, double angular_scale) {

@@ -16,6 +16,8 @@
 #include "io/snapshot.hpp"
 #include "io/snapshot_series.hpp"
 #include "sim/checkpoints.hpp"
+#include "sim/dump.hpp"
+#include "sim/own_folder.hpp"
 #include "sim/progress.hpp"
 #include "sim/stop_requests.hpp"
 #include "sim/time_loop.hpp"
@@ -117,12 +119,24 @@ class Output {
   }
 
   void write_row(const TimeLoop& loop, const ParticleOutput& particles) {
+    const std::uint64_t clamped_before = last_row_.clamped_volumes;
     last_row_ = budget_.row(loop.engine(), particles, loop.lost_work());
+    if (clamped_before == 0 && last_row_.clamped_volumes > 0) warn_of_clamped(loop.time());
     last_row_.time = loop.time();
     last_row_.step = loop.step();
     last_row_.dt = loop.dt();
     last_row_.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     diagnostics_.write(last_row_);
+  }
+
+  void warn_of_clamped(double time) const {
+    if (!comm_.is_root()) return;
+    fmt::print(
+        stderr,
+        "breccia: warning: until t = {:.6g} s, {} volume changes of a particle were cut, the grid asking for "
+        "det(I + dt L) <= 0.1 in one step; clamped_volumes in diagnostics.csv counts them, a smaller time.step or "
+        "time.cfl avoids them\n",
+        time, last_row_.clamped_volumes);
   }
 
   void write_snapshot(const TimeLoop& loop, const ParticleOutput& particles) {
@@ -264,6 +278,7 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   if (options.restart.empty()) {
     io::prepare_output_folder(options.out, comm);
   } else {
+    require_own_folder(options.out, scene, options.resolved, comm);
     if (options.restart == "auto" && finished(options.out, end, options, comm)) {
       if (comm.is_root()) fmt::print("{}: this run is finished\n", options.out.string());
       return;
@@ -274,7 +289,7 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
 
   const std::unique_ptr<TimeLoop> owned = make_loop(scene, restart, options.threads, comm);
   TimeLoop& loop = *owned;
-  Budget budget(loop.solver(), scene.gravity.uniform, comm);
+  Budget budget(loop.solver(), scene.gravity.uniform, comm, scene.numerics.energy_gain);
   if (restart) budget.restore(restart->run.budget);
   Output output(scene, options, end, restart, budget, comm);
   const double wall_before = restart ? restart->run.output.wall_seconds : 0.0;
@@ -287,14 +302,18 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   {
     Interruptions interruptions(options, scene, loop.time(), output, budget, wall_before, first_checkpoint, comm);
     Progress progress(loop.time(), loop.step(), end, options.steps.value_or(0), particles, comm);
-    loop.run(
-        [&](const TimeLoop& now) {
-          const bool last = now.time() + 0.5 * now.dt() >= end || (options.steps && now.step() >= *options.steps);
-          output.at(now, last || now.step() == 0);
-          progress.update(now.time(), now.step(), now.dt());
-          return !last;
-        },
-        [&](const TimeLoop& now) { return interruptions.at_window_start(now); });
+    try {
+      loop.run(
+          [&](const TimeLoop& now) {
+            const bool last = now.time() + 0.5 * now.dt() >= end || (options.steps && now.step() >= *options.steps);
+            output.at(now, last || now.step() == 0);
+            progress.update(now.time(), now.step(), now.dt());
+            return !last;
+          },
+          [&](const TimeLoop& now) { return interruptions.at_window_start(now); });
+    } catch (const NumericsError& error) {
+      throw NumericsError(dump(loop, scene, error.what(), options.out, comm));
+    }
     interruptions.end_if_stopped();
   }
   const double wall = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
@@ -307,6 +326,7 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   summary.precision = scene.numerics.precision == Precision::kDouble ? "double" : "mixed";
   summary.conservation = budget.drift();
   summary.damaged_fraction = output.last_row().damaged_fraction;
+  summary.clamped_volumes = output.last_row().clamped_volumes;
   summary.remnants = output.remnants(loop.engine().observe());
   summary.time_step = loop.dt();
   summary.wall_seconds = wall_before + wall;

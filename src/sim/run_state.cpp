@@ -38,7 +38,7 @@ io::DiagnosticsRow row_from(const Json& json) {
 
 Json loop_json(const LoopState& loop) {
   Json lost = Json::array();
-  for (const LostWork& work : loop.lost) lost.push_back({work.plastic, work.viscous});
+  for (const LostWork& work : loop.lost) lost.push_back({work.plastic, work.viscous, work.clamped});
   return {{"time", loop.time},
           {"dt", loop.dt},
           {"previous_dt", loop.previous_dt},
@@ -55,7 +55,11 @@ LoopState loop_from(const Json& json) {
   json.at("step").get_to(loop.step);
   json.at("sort_interval").get_to(loop.sort_interval);
   for (const Json& work : json.at("lost_work")) {
-    loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>()});
+    loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>(), work.at(2).get<std::uint64_t>()});
+  }
+  const bool steps = loop.dt > 0.0 && loop.previous_dt > 0.0 && std::isfinite(loop.dt + loop.previous_dt);
+  if (!steps || !(loop.time >= 0.0) || !std::isfinite(loop.time) || loop.sort_interval < 1) {
+    throw IoError("the state of the run has times that are none");
   }
   return loop;
 }
@@ -87,7 +91,9 @@ Json schedule_json(const ScheduleState& schedule) {
 }
 
 ScheduleState schedule_from(const Json& json) {
-  return {json.at("interval").get<double>(), null_is_never(json.at("next"))};
+  const ScheduleState schedule{json.at("interval").get<double>(), null_is_never(json.at("next"))};
+  if (!(schedule.next >= 0.0)) throw IoError("the state of the run has an output at a time that is none");
+  return schedule;
 }
 
 Json output_json(const OutputState& output) {
@@ -109,9 +115,9 @@ OutputState output_from(const Json& json) {
 }
 
 // Keys that neither the particles nor their fields depend on. Those that end in '.' stand for all below.
-constexpr std::array<std::string_view, 10> kHarmless{
-    "output.",          "scene.name",      "scene.end",    "time.cfl",      "effects.gravity",
-    "gravity.interval", "gravity.opening", "gravity.mesh", "gravity.split", "gravity.error"};
+constexpr std::array<std::string_view, 11> kHarmless{
+    "output.",          "numerics.energy_gain", "scene.name",   "scene.end",     "time.cfl",     "effects.gravity",
+    "gravity.interval", "gravity.opening",      "gravity.mesh", "gravity.split", "gravity.error"};
 
 bool harmless(const std::string& key) {
   return std::ranges::any_of(kHarmless,

@@ -13,10 +13,11 @@
 
 namespace breccia::sim {
 
-/// Work lost to heat since the start, of this rank [J].
+/// What was lost since the start, of this rank.
 struct LostWork {
-  double plastic = 0.0;
-  double viscous = 0.0;
+  double plastic = 0.0;       ///< work turned to heat by yielding [J]
+  double viscous = 0.0;       ///< and by artificial viscosity [J]
+  std::uint64_t clamped = 0;  ///< volume changes that were cut (PassReport::clamped)
 };
 
 /// Of the time loop at a window start: the window's phase and the steps since the last sorting are 0 there.

@@ -1,32 +1,84 @@
 #include "sim/setup.hpp"
 
+#include <algorithm>
 #include <cmath>
+#include <cstring>
+#include <string>
 
+#include "breccia/error.hpp"
 #include "grid/particles.hpp"
+#include "mpi/together.hpp"
 #include "scene/bodies.hpp"
 
 namespace breccia::sim {
 namespace {
 
-// Flaws of this rank's particles, body by body; particles are ordered by id and so by body.
-material::FlawLists draw_all_flaws(const Scene& scene, const ParticleArrays& particles) {
-  material::FlawLists all;
-  all.first.push_back(0);
-  std::size_t i = 0;
+// The 32-bit numbers of a field with one component.
+std::vector<std::uint32_t> values_of(const EngineState& state, const std::string& name) {
+  const auto column =
+      std::ranges::find_if(state.columns, [&](const StateColumn& candidate) { return candidate.name == name; });
+  std::vector<std::uint32_t> values(state.particles);
+  if (column == state.columns.end() || column->values.size() != values.size() * sizeof(std::uint32_t)) {
+    throw IoError("the checkpoint has no field " + name + " of the size this run needs");
+  }
+  if (!values.empty()) std::memcpy(values.data(), column->values.data(), column->values.size());
+  return values;
+}
+
+// Who the particles of this rank are, in the order in which flaws are wanted.
+struct Identities {
+  std::vector<std::uint64_t> id;
+  std::vector<std::uint32_t> body;
+};
+
+// The flaws of particles in any order, drawn body by body.
+material::FlawLists draw_all_flaws(const Scene& scene, const Identities& particles) {
+  const std::size_t count = particles.id.size();
+  std::vector<std::vector<std::uint64_t>> wanted(scene.bodies.size());
+  std::vector<std::size_t> row(count);  // in the lists of its body
+  for (std::size_t i = 0; i < count; ++i) {
+    auto& of_body = wanted.at(particles.body[i]);
+    row[i] = of_body.size();
+    of_body.push_back(particles.id[i] - scene.bodies[particles.body[i]].first_id);
+  }
+  std::vector<material::FlawLists> drawn;
   for (std::uint32_t b = 0; b < scene.bodies.size(); ++b) {
     const BodyParameters& body = scene.bodies[b];
     const MaterialParameters& material = scene.materials[body.material];
-    std::vector<std::uint64_t> wanted;
-    for (; i < particles.size() && particles.body[i] == b; ++i) wanted.push_back(particles.id[i] - body.first_id);
-    if (wanted.empty()) continue;
-    const material::FlawLists flaws =
-        material::draw_flaws(body.particles, body.mass / material.eos.rho0, material.damage, scene.seed, b, wanted);
-    for (std::size_t n = 1; n < flaws.first.size(); ++n) {
-      all.first.push_back(static_cast<std::uint32_t>(all.threshold.size()) + flaws.first[n]);
-    }
-    all.threshold.insert(all.threshold.end(), flaws.threshold.begin(), flaws.threshold.end());
+    drawn.push_back(
+        material::draw_flaws(body.particles, body.mass / material.eos.rho0, material.damage, scene.seed, b, wanted[b]));
+  }
+  material::FlawLists all;
+  all.first.push_back(0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::span<const float> mine = drawn[particles.body[i]].of(row[i]);
+    all.threshold.insert(all.threshold.end(), mine.begin(), mine.end());
+    all.first.push_back(static_cast<std::uint32_t>(all.threshold.size()));
   }
   return all;
+}
+
+material::FlawLists no_flaws(std::size_t particles) {
+  material::FlawLists none;
+  none.first.assign(particles + 1, 0U);
+  return none;
+}
+
+Identities identities_in(const EngineState& state, const Scene& scene) {
+  const std::vector<std::uint32_t> low = values_of(state, "id_low");
+  const std::vector<std::uint32_t> high = values_of(state, "id_high");
+  const std::vector<std::uint32_t> body_material = values_of(state, "body_material");
+  Identities particles;
+  for (std::size_t i = 0; i < state.particles; ++i) {
+    particles.id.push_back(low[i] | std::uint64_t{high[i]} << 32);
+    particles.body.push_back(body_material[i] & 0xffffU);
+    const std::uint32_t b = particles.body.back();
+    if (b >= scene.bodies.size() || particles.id.back() - scene.bodies[b].first_id >= scene.bodies[b].particles ||
+        body_material[i] >> 16 != scene.bodies[b].material) {
+      throw IoError("the checkpoint has a particle that is not of this scene");
+    }
+  }
+  return particles;
 }
 
 }  // namespace
@@ -35,6 +87,8 @@ std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const Resol
                                                  const mpi::Comm& comm) {
   return make_loaded_engine(scene, effects, scene::make_particles(scene, comm), threads, comm);
 }
+
+namespace {
 
 std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
                                                 const mpi::Comm& comm) {
@@ -50,15 +104,23 @@ std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const Resolv
   return grid::make_engine(setup, comm);
 }
 
+}  // namespace
+
+std::unique_ptr<grid::Engine> make_restored_engine(const Scene& scene, const ResolvedEffects& effects,
+                                                   const EngineState& state, int threads, const mpi::Comm& comm) {
+  auto engine = make_empty_engine(scene, effects, threads, comm);
+  Identities particles;
+  mpi::together<IoError>(comm, [&] { particles = identities_in(state, scene); });
+  const bool grows = effects.material.damage && !state.damage_finished;
+  engine->restore(state, grows ? draw_all_flaws(scene, particles) : no_flaws(state.particles));
+  return engine;
+}
+
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
                                                  const ParticleArrays& particles, int threads, const mpi::Comm& comm) {
   auto engine = make_empty_engine(scene, effects, threads, comm);
-  material::FlawLists flaws;
-  if (effects.material.damage) {
-    flaws = draw_all_flaws(scene, particles);
-  } else {
-    flaws.first.assign(particles.size() + 1, 0U);
-  }
+  const material::FlawLists flaws =
+      effects.material.damage ? draw_all_flaws(scene, {particles.id, particles.body}) : no_flaws(particles.size());
   std::vector<Vec3d> spins;
   for (const BodyParameters& body : scene.bodies) spins.push_back(body.spin);
   engine->insert(particles, flaws, spins);

@@ -9,9 +9,10 @@
 
 namespace breccia::sim {
 
-/// An engine without particles, for Engine::restore.
-std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
-                                                const mpi::Comm& comm);
+/// An engine that goes on from a saved state; flaws are drawn again. Collective. Throws IoError if the state is not one
+/// of the scene.
+std::unique_ptr<grid::Engine> make_restored_engine(const Scene& scene, const ResolvedEffects& effects,
+                                                   const EngineState& state, int threads, const mpi::Comm& comm);
 
 /// An engine with the particles, flaws and spins of the scene. Collective.
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects, int threads,

@@ -1,12 +1,17 @@
 #include "sim/time_loop.hpp"
 
 #include <algorithm>
-#include <cmath>
 
-#include "breccia/error.hpp"
 #include "sim/setup.hpp"
 
 namespace breccia::sim {
+namespace {
+
+double step_at_rest(const Scene& scene, const ResolvedEffects& effects) {
+  return stable_step(scene, initial_speeds(scene, effects.material.shear), effects.material.viscosity).seconds;
+}
+
+}  // namespace
 
 TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm)
     : scene_(scene),
@@ -14,7 +19,8 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
       adaptive_(!scene.time.step),
       comm_(comm),
       engine_(make_loaded_engine(scene, effects, threads, comm)),
-      window_(scene.gravity.interval) {
+      window_(scene.gravity.interval),
+      guard_(scene, step_at_rest(scene, effects), comm) {
   const grid::SignalSpeeds speeds = engine_->signal_speeds();
   dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
   set_sort_interval(speeds.particle * dt_ / scene_.cell);
@@ -22,6 +28,7 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
   if (solver_) evaluate_gravity();
   engine_->kick_velocities(0.5 * dt_);
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * dt_); });
+  guard_.note(engine_->last_pass(), step_, time_);
 }
 
 TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const EngineState& engine,
@@ -30,15 +37,15 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const Eng
       viscosity_(effects.material.viscosity),
       adaptive_(!scene.time.step),
       comm_(comm),
-      engine_(make_empty_engine(scene, effects, threads, comm)),
+      engine_(make_restored_engine(scene, effects, engine, threads, comm)),
       window_(scene.gravity.interval),
+      guard_(scene, step_at_rest(scene, effects), comm),
       time_(state.time),
       dt_(state.dt),
       previous_dt_(state.previous_dt),
       step_(state.step),
       sort_interval_(state.sort_interval) {
   make_solver(effects, threads);
-  engine_->restore(engine);
   const auto rank = static_cast<std::size_t>(comm.rank());
   if (state.lost.size() == static_cast<std::size_t>(comm.size())) {
     lost_ = state.lost[rank];
@@ -46,6 +53,7 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const Eng
     for (const LostWork& work : state.lost) {
       lost_.plastic += work.plastic;
       lost_.viscous += work.viscous;
+      lost_.clamped += work.clamped;
     }
   }
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
@@ -69,7 +77,7 @@ void TimeLoop::run(const Visit& at_time_step, const Visit& at_window_start) {
   for (;;) {
     // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
     timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
-    if (!at_time_step(*this)) return;
+    if (!at_time_step(*this)) return guard_.check(*engine_);
     if (!one_step(at_window_start)) return;
   }
 }
@@ -82,11 +90,12 @@ bool TimeLoop::one_step(const Visit& at_window_start) {
     between_steps();
     if (window_.due() && !at_window_start(*this)) return false;
     timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
+    book_pass();
   } else {
     timers_("g2p, stress, p2g", [&] { engine_->gather_scatter(dt_); });
+    book_pass();
     count_step();
   }
-  book_pass();
   return true;
 }
 
@@ -101,6 +110,7 @@ void TimeLoop::count_step() {
 void TimeLoop::between_steps() {
   count_step();
   steps_since_sort_ = 0;
+  guard_.check(*engine_);
   const double largest_move = comm_.max(engine_->last_pass().largest_move);
   timers_("damage", [&] { engine_->finish_damage(); });
   timers_("sort", [&] { engine_->sort(); });
@@ -111,7 +121,7 @@ void TimeLoop::between_steps() {
 void TimeLoop::begin_window() {
   if (adaptive_) {
     timers_("time step", [&] { dt_ = stable_step(scene_, engine_->signal_speeds(), viscosity_).seconds; });
-    if (!(dt_ > 0.0) || !std::isfinite(dt_)) throw NumericsError("the stable time step has become zero or not finite");
+    guard_.check_step(dt_, *engine_);
   }
   if (solver_) evaluate_gravity();
 }
@@ -133,8 +143,10 @@ void TimeLoop::evaluate_gravity() {
 }
 
 void TimeLoop::book_pass() {
+  guard_.note(engine_->last_pass(), step_, time_);
   lost_.plastic += engine_->last_pass().plastic_work;
   lost_.viscous += engine_->last_pass().viscous_work;
+  lost_.clamped += engine_->last_pass().clamped;
 }
 
 void TimeLoop::set_sort_interval(double cells_per_step) {

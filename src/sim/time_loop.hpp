@@ -10,6 +10,7 @@
 #include "sim/diagnostics.hpp"
 #include "sim/effects.hpp"
 #include "sim/gravity_record.hpp"
+#include "sim/guard.hpp"
 #include "sim/stage_timers.hpp"
 #include "sim/step_size.hpp"
 
@@ -30,6 +31,7 @@ class TimeLoop {
   /// and observe() is meaningful. Collective.
   /// `at_window_start` is called at the state boundary where a window begins, after sorting, gravity and the choice of
   /// dt: there engine().save() and state() are the whole run. It may end the run as well.
+  /// Throws NumericsError, the same on all ranks, if the numbers went wrong (guard.hpp).
   void run(
       const Visit& at_time_step, const Visit& at_window_start = [](const TimeLoop&) { return true; });
 
@@ -43,6 +45,7 @@ class TimeLoop {
   [[nodiscard]] gravity::Solver* solver() const { return solver_.get(); }
   [[nodiscard]] const LostWork& lost_work() const { return lost_; }
   [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
+  [[nodiscard]] const Guard& guard() const { return guard_; }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
 
  private:
@@ -64,6 +67,7 @@ class TimeLoop {
   std::unique_ptr<gravity::Solver> solver_;  // null: no self-gravity
   gravity::Window window_;
   GravityRecord gravity_record_;
+  Guard guard_;
   LostWork lost_;
   double time_ = 0.0;
   double dt_ = 0.0;           // of the step that comes

@@ -43,6 +43,9 @@ class Restart(CommandTest):
         one, other = self.folder / one, self.folder / other
         self.assertEqual(rows(one), rows(other))
         self.assertEqual((one / "run.hdf.series").read_text(), (other / "run.hdf.series").read_text())
+        # Byte for byte: files hold no times of writing.
+        for path in one.glob("snap_*.hdf"):
+            self.assertEqual(path.read_bytes(), (other / path.name).read_bytes(), path.name)
         for key in ("steps", "simulated_time", "conservation", "remnants"):
             self.assertEqual(summary(one)[key], summary(other)[key], key)
 
@@ -96,6 +99,20 @@ class Restart(CommandTest):
                 self.assertIn(number.name, errors)
                 self.assertNotIn("error", errors)
                 self.assertGreater(len(checkpoints(self.folder / out)), 0)
+
+    def test_second_interrupt_ends_at_once(self):
+        """In a window that would take hours the first one only asks."""
+        out = "interrupted"
+        scene = self.scene.read_text().replace("interval = 8", "interval = 4096").replace("particles = 300", "particles = 30000")
+        self.scene.write_text(scene.replace('cell = "10 km"', 'cell = "2 km"').replace("0.25 s", "0.05 s"))
+        process = self.start_until_rows(out, 1)
+        process.send_signal(signal.SIGINT)
+        time.sleep(0.3)
+        self.assertIsNone(process.poll())
+        process.send_signal(signal.SIGINT)
+        process.communicate(timeout=5)
+        self.assertEqual(process.returncode, -signal.SIGINT)
+        self.assertEqual(checkpoints(self.folder / out), [])
 
     def test_walltime(self):
         start = time.monotonic()

@@ -5,8 +5,11 @@
 
 #include <algorithm>
 #include <cstring>
+#include <functional>
+#include <limits>
 #include <memory>
 
+#include "breccia/error.hpp"
 #include "io/checksum.hpp"
 #include "tests/sim/collision.hpp"
 
@@ -73,9 +76,9 @@ TimeLoop::Visit until_end(Outcome& run, const mpi::Comm& comm) {
   };
 }
 
-Outcome run_through(const Scene& scene, const std::filesystem::path& file, const mpi::Comm& comm) {
+Outcome run_through(const Scene& scene, const std::filesystem::path& file, const mpi::Comm& comm, int threads = 1) {
   Outcome run;
-  TimeLoop loop(scene, resolve_effects(scene), 1, comm);
+  TimeLoop loop(scene, resolve_effects(scene), threads, comm);
   loop.run(until_end(run, comm), [&](const TimeLoop& now) {
     if (now.step() != kCheckpoint) return true;
     run.at_checkpoint = now.state();
@@ -85,10 +88,11 @@ Outcome run_through(const Scene& scene, const std::filesystem::path& file, const
   return run;
 }
 
-Outcome run_on(const Scene& scene, const std::filesystem::path& file, const LoopState& state, const mpi::Comm& comm) {
+Outcome run_on(const Scene& scene, const std::filesystem::path& file, const LoopState& state, const mpi::Comm& comm,
+               int threads = 1) {
   Outcome run;
   EXPECT_EQ(io::damage_of(file, comm), "");
-  TimeLoop loop(scene, resolve_effects(scene), io::read_checkpoint(file, comm).engine, state, 1, comm);
+  TimeLoop loop(scene, resolve_effects(scene), io::read_checkpoint(file, comm).engine, state, threads, comm);
   loop.run(until_end(run, comm));
   return run;
 }
@@ -131,6 +135,78 @@ TEST(Checkpoint, FluidWithoutEnergy) {
 // Bodies so thin that most particles share no node with others and go without grid.
 TEST(Checkpoint, LoneParticles) {
   expect_bitwise({"grid.cell=1500 m", "body[0].particles=300", "body[1].particles=300"});
+}
+
+// Neither the interrupted run nor the continued one depends on the threads.
+TEST(Checkpoint, OtherNumberOfThreads) {
+  const mpi::Comm comm;
+  const SharedFile file(comm);
+  const Scene scene = load(collision(9e3), {"gravity.interval=8", "numerics.precision=mixed"});
+  const Outcome whole = run_through(scene, file.path(), comm, 3);
+  expect_same_bits(whole, run_on(scene, file.path(), whole.at_checkpoint, comm, 2));
+  expect_same_bits(whole, run_on(scene, file.path(), whole.at_checkpoint, comm, 1));
+}
+
+// What cannot be a state is refused on all ranks, though one rank alone holds it.
+TEST(Checkpoint, StatesThatAreNone) {
+  const mpi::Comm comm;
+  const SharedFile file(comm);
+  const Scene scene = load(collision(9e3), {"gravity.interval=8"});
+  const Outcome whole = run_through(scene, file.path(), comm);
+  const auto column = [](EngineState& state, const std::string& name) -> StateColumn& {
+    return *std::ranges::find_if(state.columns, [&](const StateColumn& c) { return c.name == name; });
+  };
+  const std::vector<std::function<void(EngineState&)>> changes{
+      [](EngineState& state) { state.slab_axis = 3; },
+      [](EngineState& state) { state.slab_cuts.push_back(0); },
+      [](EngineState& state) { state.node.front() = std::numeric_limits<std::int32_t>::min(); },
+      [](EngineState& state) { state.columns.pop_back(); },
+      [&](EngineState& state) { column(state, "velocity").values.pop_back(); },
+      [&](EngineState& state) { column(state, "id_high").values[0] = std::byte{1}; },
+      [&](EngineState& state) { column(state, "body_material").values[0] = std::byte{2}; },
+      [&](EngineState& state) { column(state, "body_material").values[2] = std::byte{1}; },
+      [&](EngineState& state) { column(state, "flaws_active").values[1] = std::byte{1}; },
+  };
+  for (std::size_t n = 0; n < changes.size(); ++n) {
+    EngineState state = io::read_checkpoint(file.path(), comm).engine;
+    if (comm.rank() == comm.size() - 1) changes[n](state);
+    EXPECT_THROW(TimeLoop(scene, resolve_effects(scene), state, whole.at_checkpoint, 1, comm), IoError) << n;
+  }
+}
+
+TEST(Checkpoint, RunStatesThatAreNone) {
+  RunState run;
+  run.loop.dt = run.loop.previous_dt = 0.25;
+  EXPECT_NO_THROW(static_cast<void>(run_state_from(to_text(run))));
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  const std::vector<std::function<void(RunState&)>> changes{
+      [&](RunState& r) { r.loop.dt = nan; },
+      [](RunState& r) { r.loop.previous_dt = 0.0; },
+      [](RunState& r) { r.loop.time = -1.0; },
+      [](RunState& r) { r.loop.sort_interval = 0; },
+      [](RunState& r) { r.output.rows.next = -1e300; },
+  };
+  for (std::size_t n = 0; n < changes.size(); ++n) {
+    RunState broken = run;
+    changes[n](broken);
+    EXPECT_THROW(static_cast<void>(run_state_from(to_text(broken))), IoError) << n;
+  }
+  EXPECT_THROW(static_cast<void>(run_state_from("{}")), IoError);
+}
+
+// Mixed precision, damage growing: what there is most of. HDF5's own tables are some kB.
+TEST(Checkpoint, BytesPerParticle) {
+  const mpi::Comm comm;
+  const SharedFile file(comm);
+  const Scene scene = load(collision(5e3), {"gravity.interval=8", "numerics.precision=mixed"});
+  TimeLoop loop(scene, resolve_effects(scene), 1, comm);
+  const auto particles = static_cast<double>(comm.sum(loop.engine().stats().particles));
+  loop.run([](const TimeLoop&) { return true; },
+           [&](const TimeLoop& now) {
+             io::write_checkpoint(file.path(), {now.engine().save(), "{}"}, comm);
+             return false;
+           });
+  EXPECT_LE(static_cast<double>(std::filesystem::file_size(file.path())), 200.0 * particles);
 }
 
 // Damage that ended before the checkpoint: its fields are gone while the scene asks for them.

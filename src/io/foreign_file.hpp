@@ -1,0 +1,14 @@
+// Files of others. HDF5 trusts what it reads: a damaged file can crash the program that opens it.
+#pragma once
+
+#include <filesystem>
+
+#include "mpi/comm.hpp"
+
+namespace breccia::io {
+
+/// Reads all of the HDF5 file `path` in a child process of the root first. Throws IoError if that crashes or does not
+/// come to an end; the same on all ranks. What is merely not as expected is left to the reader. Collective.
+void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm);
+
+}  // namespace breccia::io

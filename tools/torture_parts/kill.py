@@ -1,0 +1,92 @@
+"""SIGKILL to one or all ranks of a run on two ranks, at random moments and while a checkpoint is written. Whatever is left
+must be continued by `--restart auto`, and in the end nothing may differ from the run that nobody disturbed."""
+
+import os
+import random
+import shutil
+import signal
+import time
+
+from torture_parts import runs
+
+
+def add_options(parser):
+    parser.add_argument("--count", type=int, default=200, help="kills [200; 10 with --quick]")
+    parser.add_argument("--ranks", type=int, default=2, help="ranks of the run [2]")
+    parser.add_argument("--seed", type=int, default=1, help="of the random moments [1]")
+
+
+def kill_some(process, ranks, everyone, random_source):
+    victims = ranks if everyone or not ranks else [random_source.choice(ranks)]
+    for pid in victims:
+        try:
+            os.kill(pid, signal.SIGKILL)
+        except ProcessLookupError:
+            pass
+
+
+def is_writing(out):
+    return any(out.glob("checkpoint_*.part")) or any(out.glob("snap_*.part"))
+
+
+def disturb(runner, out, length, random_source):
+    """Starts or continues the run in `out` and kills it once. Returns what was done, or None if it ended before."""
+    process = runner.start(out, "--restart", "auto")
+    during_writing = random_source.random() < 0.5
+    everyone = random_source.random() < 0.5
+    moment = random_source.uniform(0.0, length)
+    started = time.monotonic()
+    runs.wait_for(lambda: process.poll() is not None or time.monotonic() - started >= moment, length + 1.0)
+    if during_writing:
+        runs.wait_for(lambda: process.poll() is not None or is_writing(out), 5.0)
+        time.sleep(random_source.uniform(0.0, 0.01))
+    ended = process.poll() is not None
+    ranks = runs.ranks_of(process)
+    kill_some(process, ranks, everyone, random_source)
+    try:
+        errors = process.communicate(timeout=40)[1]
+    except runs.subprocess.TimeoutExpired:
+        runs.end(process)
+        return "the other ranks went on for 40 s after a kill"
+    if ended and process.returncode != 0:
+        return f"a restart failed with exit code {process.returncode}: {errors.strip().splitlines()[-1:]}"
+    return None
+
+
+def run(root, options):
+    quick = options.quick
+    count = 10 if quick else getattr(options, "count", 200)
+    ranks = getattr(options, "ranks", 2)
+    random_source = random.Random(getattr(options, "seed", 1))
+    folder = runs.fresh(root / "build" / "torture" / "kill")
+    runner = runs.Runner(root, folder, ranks)
+
+    start = time.monotonic()
+    code, errors = runner.finish(folder / "whole")
+    length = time.monotonic() - start
+    if code != 0:
+        print(errors)
+        return "the undisturbed run failed", 1
+    whole = runs.results(folder / "whole")
+
+    findings = kills = rounds = 0
+    while kills < count:
+        out = folder / f"round{rounds}"
+        rounds += 1
+        trouble = []
+        # Several kills on the way of one run: a checkpoint of a continued run is one like any other.
+        for _ in range(min(random_source.randint(1, 4), count - kills)):
+            kills += 1
+            if problem := disturb(runner, out, length, random_source):
+                trouble.append(problem)
+        code, errors = runner.finish(out, "--restart", "auto")
+        if code != 0:
+            trouble.append(f"the last restart failed with exit code {code}: {errors.strip().splitlines()[-1:]}")
+        elif different := runs.differences(whole, runs.results(out)):
+            trouble.append(f"the results differ in {', '.join(different)}")
+        if trouble:
+            findings += 1
+            print(f"{out}: {'; '.join(trouble)}", flush=True)
+        else:
+            shutil.rmtree(out)
+    return f"{kills} kills in {rounds} runs on {ranks} ranks (one takes {length:.1f} s)", findings

@@ -1,0 +1,54 @@
+"""The tests under sanitizers."""
+
+import os
+import re
+import subprocess
+
+from torture_parts import clang
+
+# The threaded engine: every loop over threads, the sweep with its phases, gravity, and whole runs.
+THREADED = ("test_sim_threads", "test_grid_reference", "test_gravity_tree", "test_gravity_direct_sum")
+QUICK_THREADED = ("test_sim_threads",)
+
+
+def run_address(root, options):
+    """All tests with address and undefined-behaviour sanitizers, the long ones included unless --quick."""
+    subprocess.run([root / "tools" / "build", "asan"], check=True)
+    environment = dict(
+        os.environ,
+        # Without slow unwinding the leaks of Open MPI cannot be told from ours.
+        ASAN_OPTIONS="fast_unwind_on_malloc=0",
+        LSAN_OPTIONS=f"suppressions={root}/tests/support/lsan.supp:print_suppressions=0",
+        UBSAN_OPTIONS="print_stacktrace=1:halt_on_error=1",
+    )
+    command = ["ctest", "--test-dir", "build/asan", "--output-on-failure", "--no-tests=error", "--timeout", "3600"]
+    if options.quick:
+        command += ["--label-exclude", "long", "--exclude-regex", "^(grid_reference|gravity_orbit|cli_)"]
+    process = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    summary = re.findall(r"\d+% tests passed, (\d+) tests failed out of (\d+)", process.stdout)
+    if process.returncode:
+        print(process.stdout[-8000:])
+    return f"{summary[-1][1] if summary else 'no'} tests", int(summary[-1][0]) if summary else 1
+
+
+def run_threads(root, options):
+    """Races of the threaded engine. libarcher tells the sanitizer what OpenMP's barriers order."""
+    names = QUICK_THREADED if options.quick else THREADED
+    clang.build(root, "tsan", *names)
+    environment = dict(
+        os.environ,
+        # Open MPI is not instrumented: what only its own threads touch is left out. Nothing else is suppressed.
+        TSAN_OPTIONS="ignore_noninstrumented_modules=1:halt_on_error=1",
+        OMP_TOOL_LIBRARIES="/usr/lib/llvm-16/lib/libarcher.so",
+        OMP_WAIT_POLICY="passive",
+        OMP_NUM_THREADS="4",
+    )
+    findings = 0
+    for name in names:
+        process = subprocess.run(
+            [root / "build" / "tsan" / "tests" / name], env=environment, capture_output=True, text=True, check=False
+        )
+        if process.returncode:
+            findings += 1
+            print(f"{name}: exit code {process.returncode}\n{process.stdout[-2000:]}{process.stderr[-6000:]}")
+    return f"{len(names)} test programs", findings
