@@ -22,6 +22,7 @@ struct alignas(64) Cell {
   Moments<double> moments{};        ///< about the centre
   std::int32_t key_bits = 0;        ///< leading key bits its particles share
   bool is_target = true;            ///< holds particles whose field this rank computes
+  bool is_stub = false;             ///< has children or particles that this rank does not know
 
   [[nodiscard]] bool is_leaf() const { return children == 0; }
   /// Targets below this cell share its interactions.

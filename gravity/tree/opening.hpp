@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "gravity/tree/cell.hpp"
 
@@ -15,6 +16,9 @@ inline constexpr double kLargestOpening = 0.8;
 /// Octupole of a cell in units of M b^3: what cells full of particles typically have. Measured: with the bound 1 in its
 /// place, equal errors cost a fifth more.
 inline constexpr double kOctupole = 0.1;
+
+/// A cell of so few particles costs less as particles.
+inline constexpr std::int64_t kFewParticles = 2;
 
 enum class Opening {
   kOpen,    ///< its children, or its particles

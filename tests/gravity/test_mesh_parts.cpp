@@ -178,10 +178,10 @@ TEST(BoxField, PairLawInsideABox) {
         mass.push_back(0.0);
       }
       std::vector<Vec3d> acceleration(position.size());
-      std::vector<double> potential(position.size());
+      std::vector<double> potential(position.size()), work(position.size());
       Stats stats;
       field.add_to({position, mass}, std::vector<std::uint8_t>(position.size(), 1), 1,
-                   {box, 1.0, 1.0, c.split, c.cutoff, softening, 1e15}, acceleration, potential, stats);
+                   {box, 1.0, 1.0, c.split, c.cutoff, softening, 1e15}, {acceleration, potential, work}, stats);
       for (std::size_t i = 1; i < position.size(); ++i) {
         const Vec3d d = source - position[i];
         const double q = 1.0 / std::sqrt(dot(d, d) + softening * softening);
