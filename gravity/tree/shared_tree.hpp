@@ -19,8 +19,8 @@ struct TopLeaf {
   double reach;  ///< no group or larger target inside sticks out farther from its centre, |T - centre| + R_T
 };
 
-/// The top holds all cells of more than coarse_limit() particles, and those that hold particles of several ranks down
-/// to single groups; its leaves belong to one rank each. A group that lies on several ranks goes to the one that has
+/// The top holds the largest cells, some ten thousand, and those that hold particles of several ranks down to single
+/// groups; its leaves belong to one rank each. A group that lies on several ranks goes to the one that has
 /// most of it: its particles travel there and their field comes back. Everything else stays where it is, so that memory
 /// and messages grow with the surface between the ranks.
 class SharedTree {

@@ -16,7 +16,7 @@
 
 namespace breccia::gravity {
 
-/// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree; every rank knows them.
+/// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree, of which scales are sampled.
 inline constexpr std::int64_t kCoarseCells = 1024;
 
 /// How a cell splits: its children differ in `bits` key bits after the first `start`.
