@@ -187,14 +187,13 @@ void graft(Tree& tree, const std::vector<SentCell>& cells, const std::vector<Sen
       child.centre = c.centre;
       child.moments = {c.mass, {c.second[0], c.second[1], c.second[2], c.second[3], c.second[4], c.second[5]}};
       child.is_target = false;
-      child.is_stub = true;
+      child.children = kStub;
       tree.cells.push_back(child);
     }
     Cell& cell = tree.cells[static_cast<std::size_t>(place[q])];
     if (from.children > 0) {
       cell.first_child = first;
       cell.children = from.children;
-      cell.is_stub = false;
     }
     if (from.particles > 0) {
       cell.begin = static_cast<std::int32_t>(tree.particles.x.size());
@@ -202,7 +201,7 @@ void graft(Tree& tree, const std::vector<SentCell>& cells, const std::vector<Sen
         tree.particles.append(particles[next_particle].position, particles[next_particle].mass);
       }
       cell.end = static_cast<std::int32_t>(tree.particles.x.size());
-      cell.is_stub = false;
+      cell.children = 0;
     }
   }
 }

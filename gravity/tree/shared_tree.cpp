@@ -231,7 +231,7 @@ void SharedTree::grow_below() {
     if (leaf.owner == comm_.rank()) {
       own.push_back(leaf.cell);
     } else {
-      tree_.cells[static_cast<std::size_t>(leaf.cell)].is_stub = true;
+      tree_.cells[static_cast<std::size_t>(leaf.cell)].children = kStub;
     }
   }
   tree_.grow(own, threads_);

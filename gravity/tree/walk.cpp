@@ -182,7 +182,7 @@ class Walker {
         const Opening how = source.count > kFewParticles ? opening(source, group, allowed) : Opening::kOpen;
         if (how == Opening::kExpand) {
           w.expansions.push_back(s);
-        } else if (how == Opening::kWhole || source.is_stub) {
+        } else if (how == Opening::kWhole || source.is_stub()) {
           w.work.cells.push_back(s);
           if (how == Opening::kOpen) w.counts.missing += 1.0;
         } else if (source.is_leaf()) {
