@@ -11,11 +11,6 @@ namespace {
 
 constexpr std::size_t kMostChildren = 8;
 
-// Cells of more than one in so many particles belong to the top. Below its leaves needs are bounded, not known: where
-// leaves of debris are as wide as a body, all of the body would be sent.
-constexpr std::int64_t kTopLeaves = 8192;
-static_assert(kTopLeaves >= kCoarseCells, "scales are sampled from the coarse tree, which all ranks must know");
-
 }  // namespace
 
 // What all ranks together have in some cells.
@@ -88,7 +83,8 @@ void SharedTree::grow_top() {
   tree_.cells.push_back(root);
   top_.push_back(all.top_cell(0));
 
-  const std::int64_t limit = std::max(kGroupParticles, root.count / kTopLeaves);
+  // Needs below the leaves are bounded, not known: were leaves of debris as wide as a body, all of it would be sent.
+  const std::int64_t limit = std::max(kGroupParticles, root.count / top_leaves_);
   std::size_t level = 0;
   while (level < top_.size()) {
     std::vector<std::size_t> frontier;

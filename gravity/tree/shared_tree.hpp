@@ -25,7 +25,12 @@ struct TopLeaf {
 /// and messages grow with the surface between the ranks.
 class SharedTree {
  public:
-  SharedTree(const mpi::Comm& comm, int threads) : comm_(comm), threads_(threads) {}
+  /// Cells of more than one in so many particles belong to the top.
+  static constexpr std::int64_t kTopLeaves = 8192;
+
+  /// `top_leaves`: in place of kTopLeaves; at least kCoarseCells, as scales are sampled from the coarse tree.
+  SharedTree(const mpi::Comm& comm, int threads, std::int64_t top_leaves = kTopLeaves)
+      : comm_(comm), threads_(threads), top_leaves_(top_leaves) {}
 
   /// Builds the tree. All cells know their moments; those below the leaves of other ranks are not there. Collective.
   void build(const Root& root, ParticlesView particles, double mass_unit);
@@ -77,6 +82,7 @@ class SharedTree {
 
   mpi::Comm comm_;
   int threads_;
+  std::int64_t top_leaves_;
   double bytes_sent_ = 0.0;
   Tree tree_;
   std::vector<TopCell> top_;

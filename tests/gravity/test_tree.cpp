@@ -145,20 +145,6 @@ TEST(TreeSolver, FieldIsTheSameOnAnyNumberOfRanks) {
   }
 }
 
-// So many particles that leaves of the top hold many groups, whose needs are bounded instead of known.
-TEST(TreeSolver, WhatIsImportedSufficesBelowTheTop) {
-  const mpi::Comm comm;
-  if (comm.size() != 2) GTEST_SKIP() << "large: two ranks are enough";
-  const Cloud cloud = body_with_debris(400'000, 2e7);
-  const Result should = alone(cloud, with_opening(0.0));
-  const Result is = tree(cloud, with_opening(0.0), slabs(cloud));
-  EXPECT_EQ(is.stats.cells_missing, 0.0);
-  EXPECT_EQ(comm.sum(is.stats.pairs), should.stats.pairs);
-  EXPECT_LT(rms_of_ratios(is.field.acceleration, should.field.acceleration), 1e-6);
-  // Each rank holds half of the particles; what it imports is the surface between them (gravity.md 2: 19 % of n/4).
-  EXPECT_LT(is.stats.particles_imported, 0.25 * 200'000);
-}
-
 TEST(TreeSolver, ThreadsDoNotChangeABit) {
   const Cloud cloud = body_with_debris(4000, 2e7);
   const Field one = tree(cloud, with_opening(0.0), round_robin(), 1).field;
