@@ -105,7 +105,10 @@ class Walker {
   }
 
   void push_children(std::vector<std::int32_t>& stack, const Cell& source) const {
-    for (std::int32_t c = source.first_child + source.children; c-- > source.first_child;) stack.push_back(c);
+    for (std::int32_t c = source.first_child + source.children; c-- > source.first_child;) {
+      __builtin_prefetch(&sources_.cell(c));
+      stack.push_back(c);
+    }
   }
 
   // Expands the candidates that are far enough, or their parts, around cell t; returns the others.
