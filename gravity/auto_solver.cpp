@@ -20,12 +20,13 @@ void AutoSolver<Real>::evaluate(ParticlesView particles, std::span<Vec3d> accele
   const MethodChoice choice = cheapest_method(matter, parameters_.error);
   if (choice.method == GravityMethod::kTreePm) {
     mesh_.evaluate_in(layout, particles, acceleration, potential);
-    stats_ = mesh_.last();
+    used_ = &mesh_;
   } else {
     Solver& solver = choice.method == GravityMethod::kTree ? static_cast<Solver&>(tree_) : direct_;
     solver.evaluate(particles, acceleration, potential);
-    stats_ = solver.last();
+    used_ = &solver;
   }
+  stats_ = used_->last();
   stats_.reason = choice.reason;
   stats_.seconds += choosing[Phase::kBoxes];
   stats_.phases[Phase::kBoxes] = choosing[Phase::kBoxes];

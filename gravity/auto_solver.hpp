@@ -21,6 +21,7 @@ class AutoSolver final : public Solver {
 
   void evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) override;
   [[nodiscard]] const Stats& last() const override { return stats_; }
+  [[nodiscard]] std::span<const double> work() const override { return used_->work(); }
 
  private:
   Parameters parameters_;
@@ -28,6 +29,7 @@ class AutoSolver final : public Solver {
   DirectSum direct_;
   TreeSolver tree_;
   TreePm<Real> mesh_;
+  const Solver* used_ = &direct_;
   Stats stats_;
 };
 

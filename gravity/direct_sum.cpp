@@ -35,6 +35,8 @@ void DirectSum::evaluate(ParticlesView particles, std::span<Vec3d> acceleration,
     }
   });
   write(particles, mass_unit, acceleration, potential);
+  const auto all = static_cast<double>(comm_.sum(static_cast<std::uint64_t>(particles.position.size())));
+  work_.assign(particles.position.size(), all);
 
   book_momentum(particles, acceleration, comm_, stats_);
 }

@@ -19,6 +19,7 @@ class DirectSum final : public Solver {
 
   void evaluate(ParticlesView particles, std::span<Vec3d> acceleration, std::span<double> potential) override;
   [[nodiscard]] const Stats& last() const override { return stats_; }
+  [[nodiscard]] std::span<const double> work() const override { return work_; }
 
  private:
   /// Targets, and the two ends of the ring: what this rank sums over and what arrives meanwhile.
@@ -40,6 +41,7 @@ class DirectSum final : public Solver {
   Stats stats_;
   Ring<float> float_ring_;
   Ring<double> double_ring_;
+  std::vector<double> work_;
   std::vector<double> sums_[4];  ///< acceleration and potential in units of G times the mass unit
 };
 

@@ -20,6 +20,13 @@ void book_momentum(ParticlesView particles, std::span<const Vec3d> acceleration,
 /// disturbed as little, while an equal acceleration of all would drown its own.
 void remove_net_force(ParticlesView particles, std::span<Vec3d> acceleration, const mpi::Comm& comm, Stats& stats);
 
+/// Fields of this rank's particles, to which the parts of a solver add.
+struct FieldView {
+  std::span<Vec3d> acceleration;  ///< [m/s2]
+  std::span<double> potential;    ///< [J/kg]; empty: not wanted
+  std::span<double> work;         ///< Solver::work()
+};
+
 /// Adds the wall time of its lifetime to `seconds`.
 class Stopwatch {
  public:

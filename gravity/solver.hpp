@@ -45,7 +45,10 @@ struct Stats {
   double cell_interactions = 0.0;  ///< particle with cell
   double expansions = 0.0;         ///< cell with cell
   double bytes_sent = 0.0;
-  int boxes = 0;  ///< that have a mesh
+  double cells_imported = 0.0;  ///< tree cells and particles that other ranks sent for the walk (not the near field)
+  double particles_imported = 0.0;
+  double cells_missing = 0.0;  ///< times that a cell was taken whole because another rank had not sent its parts; 0
+  int boxes = 0;               ///< that have a mesh
   Phases phases{};
   GravityMethod method = GravityMethod::kDirect;  ///< that was used
   std::string reason{};                           ///< for it; empty unless kAuto chose
@@ -66,6 +69,10 @@ class Solver {
 
   /// Of the last evaluation.
   [[nodiscard]] virtual const Stats& last() const = 0;
+
+  /// What each of this rank's particles cost in the last evaluation, in pairs of particles: counted, not timed, so that
+  /// a balance of loads repeats. The mesh costs all of its particles the same and is not in it.
+  [[nodiscard]] virtual std::span<const double> work() const = 0;
 };
 
 /// The solver for `method`; kAuto chooses anew at each evaluation. Throws UsageError for kOff, for methods this program

@@ -96,15 +96,19 @@ std::vector<Vec3d> direct_acceleration(ParticlesView particles, const std::vecto
   return result;
 }
 
+FieldErrors field_errors(std::span<const Vec3d> is, std::span<const Vec3d> should, const mpi::Comm& comm) {
+  std::vector<Deviation> mine;
+  for (std::size_t k = 0; k < is.size(); ++k) mine.push_back({norm(is[k] - should[k]), norm(should[k])});
+  return statistics(comm.allgather_arrays(std::span<const Deviation>(mine)));
+}
+
 FieldErrors verify(ParticlesView particles, std::span<const Vec3d> acceleration, double softening, std::int64_t count,
                    const mpi::Comm& comm, int threads) {
   const std::vector<std::int64_t> targets = draw(particles.position.size(), count, comm);
   const std::vector<Vec3d> exact = direct_acceleration(particles, targets, softening, comm, threads);
-  std::vector<Deviation> mine;
-  for (std::size_t k = 0; k < targets.size(); ++k) {
-    mine.push_back({norm(acceleration[static_cast<std::size_t>(targets[k])] - exact[k]), norm(exact[k])});
-  }
-  return statistics(comm.allgather_arrays(std::span<const Deviation>(mine)));
+  std::vector<Vec3d> is;
+  for (const std::int64_t i : targets) is.push_back(acceleration[static_cast<std::size_t>(i)]);
+  return field_errors(is, exact, comm);
 }
 
 }  // namespace breccia::gravity

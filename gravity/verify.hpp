@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "gravity/solver.hpp"
@@ -19,6 +20,10 @@ struct FieldErrors {
 /// double. Collective.
 std::vector<Vec3d> direct_acceleration(ParticlesView particles, const std::vector<std::int64_t>& targets,
                                        double softening, const mpi::Comm& comm, int threads);
+
+/// Errors of accelerations `is` of this rank's targets, with those of the other ranks. Collective; the result is the
+/// same on all ranks.
+FieldErrors field_errors(std::span<const Vec3d> is, std::span<const Vec3d> should, const mpi::Comm& comm);
 
 /// Compares the accelerations of `count` particles chosen at random from all ranks (all if there are fewer) with direct
 /// sums. Collective; the result is the same on all ranks.

@@ -53,6 +53,10 @@ class Comm {
     MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), datatype<T>(), MPI_SUM, handle_);
   }
   template <class T>
+  void max(std::span<T> values) const {
+    MPI_Allreduce(MPI_IN_PLACE, values.data(), static_cast<int>(values.size()), datatype<T>(), MPI_MAX, handle_);
+  }
+  template <class T>
   [[nodiscard]] T sum(T value) const {
     return reduce(value, MPI_SUM);
   }

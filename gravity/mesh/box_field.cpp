@@ -8,8 +8,7 @@ namespace breccia::gravity {
 
 template <class Real>
 void BoxField<Real>::add_to(ParticlesView particles, std::span<const std::uint8_t> set, std::uint8_t number,
-                            const BoxSettings& settings, std::span<Vec3d> acceleration, std::span<double> potential,
-                            Stats& stats) {
+                            const BoxSettings& settings, const FieldView& field, Stats& stats) {
   const MeshGeometry geometry(settings.box, settings.cell);
   Phases& phases = stats.phases;
   phases.time(Phase::kTransform, [&] {
@@ -25,8 +24,8 @@ void BoxField<Real>::add_to(ParticlesView particles, std::span<const std::uint8_
   });
   mesh_->add_field(clusters_, field_, phases);
   stats.pairs += near_.add_field(clusters_, position_, mass_, settings.spacing / settings.cell, law_,
-                                 !potential.empty(), field_, phases);
-  write(settings, acceleration, potential);
+                                 !field.potential.empty(), field_, phases);
+  write(settings, field);
 }
 
 template <class Real>
@@ -53,8 +52,7 @@ void BoxField<Real>::select(ParticlesView particles, std::span<const std::uint8_
 }
 
 template <class Real>
-void BoxField<Real>::write(const BoxSettings& settings, std::span<Vec3d> acceleration,
-                           std::span<double> potential) const {
+void BoxField<Real>::write(const BoxSettings& settings, const FieldView& field) const {
   const double potential_unit = kGravitationalConstant * settings.mass_unit / settings.cell;
   const double unit = potential_unit / settings.cell;
   // A softened particle also got its own potential, of both parts together that of Plummer's law at distance 0.
@@ -65,10 +63,11 @@ void BoxField<Real>::write(const BoxSettings& settings, std::span<Vec3d> acceler
   for (std::int64_t k = 0; k < n; ++k) {
     const std::size_t i = index_[static_cast<std::size_t>(k)];
     const auto slot = static_cast<std::size_t>(slots[static_cast<std::size_t>(k)]);
-    acceleration[i] += unit * Vec3d{static_cast<double>(field_[0][slot]), static_cast<double>(field_[1][slot]),
-                                    static_cast<double>(field_[2][slot])};
-    if (!potential.empty()) {
-      potential[i] +=
+    field.acceleration[i] += unit * Vec3d{static_cast<double>(field_[0][slot]), static_cast<double>(field_[1][slot]),
+                                          static_cast<double>(field_[2][slot])};
+    field.work[i] += static_cast<double>(near_.pairs_of_clusters()[slot / kClusterSize]);
+    if (!field.potential.empty()) {
+      field.potential[i] +=
           potential_unit * (static_cast<double>(field_[3][slot]) + self * mass_[static_cast<std::size_t>(k)]);
     }
   }

@@ -4,9 +4,9 @@
 #include <memory>
 #include <span>
 
+#include "gravity/evaluation.hpp"
 #include "gravity/mesh/box_mesh.hpp"
 #include "gravity/mesh/near_field.hpp"
-#include "gravity/solver.hpp"
 
 namespace breccia::gravity {
 
@@ -28,13 +28,13 @@ class BoxField {
   /// Adds the field [m/s2, J/kg] of the particles whose set is `number` to those of them on this rank. The mesh and
   /// its kernel are kept while size and settings stay. Collective.
   void add_to(ParticlesView particles, std::span<const std::uint8_t> set, std::uint8_t number,
-              const BoxSettings& settings, std::span<Vec3d> acceleration, std::span<double> potential, Stats& stats);
+              const BoxSettings& settings, const FieldView& field, Stats& stats);
 
  private:
   void select(ParticlesView particles, std::span<const std::uint8_t> set, std::uint8_t number,
               const MeshGeometry& geometry, double mass_unit);
   void prepare_mesh(const MeshGeometry& geometry, const GaussianSplit& split);
-  void write(const BoxSettings& settings, std::span<Vec3d> acceleration, std::span<double> potential) const;
+  void write(const BoxSettings& settings, const FieldView& field) const;
 
   mpi::Comm comm_;
   int threads_;

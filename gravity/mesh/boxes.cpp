@@ -2,7 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <unordered_map>
+#include <limits>
+
+#include "gravity/mesh/blocks.hpp"
 
 namespace breccia::gravity {
 
@@ -16,82 +18,19 @@ namespace {
 // Blocks of space are this many mean distances wide, 64 particles where it is full. What has swelled much beyond that
 // would have its neighbours beyond the reach of the pairs.
 constexpr double kBlockWidth = 4.0;
-constexpr std::int64_t kDenseCount = 24;
+constexpr std::int64_t kFullCount = 64;
+constexpr double kDense = 0.375;
+
+// Where more blocks than this could be dense, they are twice as wide: all ranks must know them.
+constexpr std::uint64_t kMostDenseBlocks = 4096;
+
+// A rank names those blocks to the others in which it has its share of a dense one's particles, or this many.
+constexpr std::int64_t kLeastNamed = 4;
 
 constexpr double kLeastParticlesPerNode = 0.05;
 
 // One mesh over two boxes may have this many times the nodes of two meshes: it saves the tree between them.
 constexpr double kMergeCost = 2.0;
-
-/// The particles in one block of space.
-struct Block {
-  std::int32_t x, y, z;
-  std::int64_t count = 0;
-  double mass = 0.0;
-  Box bounds{};
-
-  void add(std::int64_t n, double m, const Box& b) {
-    if (count == 0) bounds = b;
-    count += n;
-    mass += m;
-    bounds.low = {std::min(bounds.low.x, b.low.x), std::min(bounds.low.y, b.low.y), std::min(bounds.low.z, b.low.z)};
-    bounds.high = {std::max(bounds.high.x, b.high.x), std::max(bounds.high.y, b.high.y),
-                   std::max(bounds.high.z, b.high.z)};
-  }
-};
-
-// 21 bits per axis; blocks two million apart share a key, which only makes them one block.
-std::uint64_t key_of(std::int32_t x, std::int32_t y, std::int32_t z) {
-  constexpr std::uint64_t kMask = (1U << 21) - 1;
-  const auto part = [](std::int32_t i) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i)) & kMask; };
-  return part(x) << 42 | part(y) << 21 | part(z);
-}
-
-std::int32_t block_coordinate(double x, double width) {
-  return static_cast<std::int32_t>(std::clamp(std::floor(x / width), -2e9, 2e9));
-}
-
-/// Occupied blocks in the order in which their first particles came.
-class Blocks {
- public:
-  Block& at(std::int32_t x, std::int32_t y, std::int32_t z) {
-    const std::uint64_t key = key_of(x, y, z);
-    // Particles mostly come in the order of space.
-    if (all_.empty() || key != last_key_) {
-      last_key_ = key;
-      const auto [place, is_new] = index_.try_emplace(key, all_.size());
-      if (is_new) all_.push_back({x, y, z});
-      last_ = place->second;
-    }
-    return all_[last_];
-  }
-  /// Index of a block, or -1.
-  [[nodiscard]] std::int64_t find(std::int32_t x, std::int32_t y, std::int32_t z) const {
-    const auto place = index_.find(key_of(x, y, z));
-    return place == index_.end() ? -1 : static_cast<std::int64_t>(place->second);
-  }
-  [[nodiscard]] const std::vector<Block>& all() const { return all_; }
-
- private:
-  std::vector<Block> all_;
-  std::unordered_map<std::uint64_t, std::size_t> index_;
-  std::uint64_t last_key_ = 0;
-  std::size_t last_ = 0;
-};
-
-Blocks count_blocks(ParticlesView particles, double width, const mpi::Comm& comm) {
-  Blocks own;
-  for (std::size_t i = 0; i < particles.position.size(); ++i) {
-    const Vec3d p = particles.position[i];
-    own.at(block_coordinate(p.x, width), block_coordinate(p.y, width), block_coordinate(p.z, width))
-        .add(1, particles.mass[i], {p, p});
-  }
-  if (comm.size() == 1) return own;
-  Blocks blocks;
-  for (const Block& b : comm.allgather_arrays<Block>(own.all()))
-    blocks.at(b.x, b.y, b.z).add(b.count, b.mass, b.bounds);
-  return blocks;
-}
 
 /// A body: its dense blocks and the blocks around them.
 struct Region {
@@ -101,35 +40,91 @@ struct Region {
 };
 
 template <class F>
-void for_each_neighbour(const Blocks& blocks, const Block& b, const F& f) {
+void for_each_neighbour(const Blocks& blocks, BlockIndex b, const F& f) {
   for (int dx = -1; dx <= 1; ++dx) {
     for (int dy = -1; dy <= 1; ++dy) {
       for (int dz = -1; dz <= 1; ++dz) {
-        const std::int64_t n = blocks.find(b.x + dx, b.y + dy, b.z + dz);
+        const std::int64_t n = blocks.find({b.x + dx, b.y + dy, b.z + dz});
         if (n >= 0) f(static_cast<std::size_t>(n));
       }
     }
   }
 }
 
-// The dense blocks connected with `start`, and the bounds of all particles in and next to them.
-Region flood(const Blocks& blocks, std::size_t start, std::vector<bool>& seen) {
-  Block sum{};
-  std::vector<std::size_t> front{start};
-  seen[start] = true;
-  while (!front.empty()) {
-    const Block& b = blocks.all()[front.back()];
-    front.pop_back();
-    sum.add(b.count, b.mass, b.bounds);
-    for_each_neighbour(blocks, b, [&](std::size_t n) {
-      const Block& neighbour = blocks.all()[n];
-      sum.add(0, 0.0, neighbour.bounds);
-      if (seen[n] || neighbour.count < kDenseCount) return;
-      seen[n] = true;
-      front.push_back(n);
+// Blocks that hold `least` particles of all ranks, the same on all of them but for the order.
+Blocks dense_blocks(const Blocks& own, std::int64_t least, const mpi::Comm& comm) {
+  const std::int64_t share = comm.size() == 1 ? least : std::max(kLeastNamed, (least + comm.size() - 1) / comm.size());
+  std::vector<BlockIndex> named;
+  for (const Block& b : own.all()) {
+    if (b.count >= share) named.push_back(b.index);
+  }
+  Blocks all;
+  for (const BlockIndex& index : comm.allgather_arrays(std::span<const BlockIndex>(named))) all.at(index);
+  std::vector<std::int64_t> counts;
+  for (const Block& b : all.all()) {
+    const std::int64_t here = own.find(b.index);
+    counts.push_back(here >= 0 ? own.all()[static_cast<std::size_t>(here)].count : 0);
+  }
+  comm.sum(std::span<std::int64_t>(counts));
+  Blocks dense;
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    if (counts[i] >= least) dense.at(all.all()[i].index).count = counts[i];
+  }
+  return dense;
+}
+
+// Numbers the connected parts of the dense blocks; returns how many there are.
+std::size_t number_parts(const Blocks& dense, std::vector<std::size_t>& part) {
+  constexpr std::size_t kNone = ~std::size_t{0};
+  part.assign(dense.all().size(), kNone);
+  std::size_t parts = 0;
+  for (std::size_t start = 0; start < part.size(); ++start) {
+    if (part[start] != kNone) continue;
+    std::vector<std::size_t> front{start};
+    part[start] = parts;
+    while (!front.empty()) {
+      const BlockIndex here = dense.all()[front.back()].index;
+      front.pop_back();
+      for_each_neighbour(dense, here, [&](std::size_t n) {
+        if (part[n] != kNone) return;
+        part[n] = parts;
+        front.push_back(n);
+      });
+    }
+    ++parts;
+  }
+  return parts;
+}
+
+// The connected parts of the dense blocks, with the bounds of all particles in and next to them.
+std::vector<Region> dense_regions(const Blocks& own, const Blocks& dense, const mpi::Comm& comm) {
+  constexpr double kFar = std::numeric_limits<double>::max();
+  std::vector<std::size_t> part;
+  const std::size_t parts = number_parts(dense, part);
+  std::vector<double> sums(2 * parts, 0.0);
+  std::vector<double> extremes(6 * parts, -kFar);  // highest coordinates and the negative of the lowest
+  for (std::size_t i = 0; i < part.size(); ++i) {
+    const BlockIndex index = dense.all()[i].index;
+    const std::int64_t here = own.find(index);
+    if (here >= 0) {
+      sums[2 * part[i]] += static_cast<double>(own.all()[static_cast<std::size_t>(here)].count);
+      sums[2 * part[i] + 1] += own.all()[static_cast<std::size_t>(here)].mass;
+    }
+    for_each_neighbour(own, index, [&](std::size_t n) {
+      const Box& b = own.all()[n].bounds;
+      const double values[6] = {b.high.x, b.high.y, b.high.z, -b.low.x, -b.low.y, -b.low.z};
+      for (std::size_t k = 0; k < 6; ++k) extremes[6 * part[i] + k] = std::max(extremes[6 * part[i] + k], values[k]);
     });
   }
-  return {sum.bounds, sum.mass, sum.count};
+  comm.sum(std::span<double>(sums));
+  comm.max(std::span<double>(extremes));
+  std::vector<Region> regions;
+  for (std::size_t p = 0; p < parts; ++p) {
+    const double* e = &extremes[6 * p];
+    regions.push_back(
+        {{{-e[3], -e[4], -e[5]}, {e[0], e[1], e[2]}}, sums[2 * p + 1], static_cast<std::int64_t>(sums[2 * p])});
+  }
+  return regions;
 }
 
 Region merged(const Region& a, const Region& b) {
@@ -160,42 +155,46 @@ bool merge_one_pair(std::vector<Region>& regions, double cell) {
 }
 
 // Of the particles in the emptier blocks, so that these hold `fraction` of them all, the last one's block's count.
-std::int64_t count_at(const std::vector<std::int64_t>& sorted, double fraction) {
+std::int64_t count_at(std::span<const Occupancy> sorted, double fraction) {
   std::int64_t all = 0;
-  for (const std::int64_t count : sorted) all += count;
+  for (const Occupancy& o : sorted) all += o.particles * o.blocks;
   std::int64_t before = 0;
-  for (const std::int64_t count : sorted) {
-    before += count;
-    if (static_cast<double>(before) >= fraction * static_cast<double>(all)) return count;
+  for (const Occupancy& o : sorted) {
+    before += o.particles * o.blocks;
+    if (static_cast<double>(before) >= fraction * static_cast<double>(all)) return o.particles;
   }
   return 0;
 }
 
 // How many particles share the block of the median one, without debris: blocks far emptier than those of the most
 // crowded tenth, as a body of a tenth of the mass may get a box whatever there is around it.
-std::int64_t median_dense_count(std::vector<std::int64_t> counts) {
-  std::sort(counts.begin(), counts.end());
-  const std::int64_t least = count_at(counts, 1.0 - kLeastBoxMass) / 8;
-  counts.erase(counts.begin(), std::lower_bound(counts.begin(), counts.end(), least));
-  return count_at(counts, 0.5);
+std::int64_t median_dense_count(std::vector<Occupancy> blocks) {
+  const std::int64_t least = count_at(blocks, 1.0 - kLeastBoxMass) / 8;
+  std::erase_if(blocks, [&](const Occupancy& o) { return o.particles < least; });
+  return count_at(blocks, 0.5);
 }
 
 }  // namespace
 
 std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double cell, const mpi::Comm& comm) {
-  const Blocks blocks = count_blocks(particles, kBlockWidth * spacing, comm);
-  double total = 0.0;
-  for (const Block& b : blocks.all()) total += b.mass;
-
-  std::vector<Region> regions;
-  std::vector<bool> seen(blocks.all().size(), false);
-  for (std::size_t i = 0; i < seen.size(); ++i) {
-    if (seen[i] || blocks.all()[i].count < kDenseCount) continue;
-    const Region region = flood(blocks, i, seen);
-    if (region.count < kLeastBoxParticles || region.mass < kLeastBoxMass * total) continue;
-    if (static_cast<double>(region.count) < kLeastParticlesPerNode * mesh_nodes(region.box, cell)) continue;
-    regions.push_back(region);
+  std::int64_t full = kFullCount;
+  double width = kBlockWidth * spacing;
+  const std::uint64_t all = comm.sum(static_cast<std::uint64_t>(particles.position.size()));
+  while (all > kMostDenseBlocks * static_cast<std::uint64_t>(full)) {
+    full *= 8;
+    width *= 2.0;
   }
+  const Blocks own = count_in_blocks(particles, width);
+  double total = 0.0;
+  for (const Block& b : own.all()) total += b.mass;
+  total = comm.sum(total);
+
+  const Blocks dense = dense_blocks(own, static_cast<std::int64_t>(kDense * static_cast<double>(full)), comm);
+  std::vector<Region> regions = dense_regions(own, dense, comm);
+  std::erase_if(regions, [&](const Region& r) {
+    return r.count < kLeastBoxParticles || r.mass < kLeastBoxMass * total ||
+           static_cast<double>(r.count) < kLeastParticlesPerNode * mesh_nodes(r.box, cell);
+  });
   // Ties are broken by place, so that the order does not depend on that of the particles.
   std::sort(regions.begin(), regions.end(), [](const Region& a, const Region& b) {
     return a.count != b.count ? a.count > b.count : a.box.low.x < b.box.low.x;
@@ -209,9 +208,11 @@ std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double ce
 }
 
 double dense_spacing(ParticlesView particles, const mpi::Comm& comm) {
-  // Between 16 and 128 particles in the median dense particle's block; the width is narrowed towards that.
+  // Between 16 and 128 particles in the median dense particle's block. The width is changed towards 45; blocks that are
+  // filled in part hold more after that than expected.
   constexpr std::int64_t kFewest = 16;
   constexpr std::int64_t kMost = 128;
+  constexpr double kWanted = 45.0;
   Block own{};
   for (const Vec3d p : particles.position) own.add(1, 0.0, {p, p});
   Block all{};
@@ -221,15 +222,11 @@ double dense_spacing(ParticlesView particles, const mpi::Comm& comm) {
   const Vec3d extent = all.bounds.high - all.bounds.low;
   double width = std::max({extent.x, extent.y, extent.z});
   if (all.count < 2 || !(width > 0.0)) return 1.0;
-  for (int halvings = 0;; ++halvings) {
-    std::vector<std::int64_t> counts;
-    const Blocks blocks = count_blocks(particles, width, comm);
-    for (const Block& b : blocks.all()) counts.push_back(b.count);
-    const std::int64_t count = median_dense_count(counts);
+  for (int trial = 0;; ++trial) {
+    const std::int64_t count = median_dense_count(occupancy(particles, width, comm));
     const double spacing = width / std::cbrt(static_cast<double>(count));
-    if (count <= kMost || halvings == 40) return spacing;
-    // Never below the fewest: a third of the width has at least a 27th of the particles where they are even.
-    width *= std::max(0.5, std::cbrt(static_cast<double>(kFewest) / static_cast<double>(count)));
+    if ((count >= kFewest && count <= kMost) || (count <= kMost && trial == 0) || trial == 40) return spacing;
+    width *= std::cbrt(kWanted / static_cast<double>(count));
   }
 }
 

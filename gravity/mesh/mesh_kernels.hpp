@@ -50,7 +50,7 @@ struct NearTask {
   ClusterColumns columns;  ///< of the sources
   const ShortRange<Real>* law;
   Real* result[4];      ///< acceleration and potential of each target slot; potential null: not wanted
-  std::int64_t* pairs;  ///< pairs evaluated are added here
+  std::int64_t* pairs;  ///< of each target cluster: sources summed over are added here
 };
 
 #define BRECCIA_DECLARE_MESH_KERNELS(Real)            \

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 
 #include "gravity/mesh/mesh_kernels.hpp"
 
@@ -29,14 +30,14 @@ template <class Real>
 double NearField<Real>::add_field(const Clusters<Real>& own, std::span<const Vec3d> position,
                                   std::span<const double> mass, double spacing, const ShortRange<Real>& law,
                                   bool with_potential, SlotField<Real>& field, Phases& phases) {
-  double pairs = 0.0;
+  pairs_.assign(static_cast<std::size_t>(own.count()), 0);
   phases.time(Phase::kPairs, [&] {
     if (comm_.size() > 1)
       fetch_halo(position, mass, std::sqrt(static_cast<double>(law.cutoff_squared)), spacing, phases);
-    pairs = add_from(own, own, law, with_potential, field);
-    if (halo_.count() > 0) pairs += add_from(halo_, own, law, with_potential, field);
+    add_from(own, own, law, with_potential, field);
+    if (halo_.count() > 0) add_from(halo_, own, law, with_potential, field);
   });
-  return pairs;
+  return static_cast<double>(kClusterSize * std::accumulate(pairs_.begin(), pairs_.end(), std::int64_t{0}));
 }
 
 // Every rank gets those particles of the others that lie within the cutoff of the box around its own.
@@ -68,15 +69,13 @@ void NearField<Real>::fetch_halo(std::span<const Vec3d> position, std::span<cons
 }
 
 template <class Real>
-double NearField<Real>::add_from(const Clusters<Real>& sources, const Clusters<Real>& own, const ShortRange<Real>& law,
-                                 bool with_potential, SlotField<Real>& field) const {
+void NearField<Real>::add_from(const Clusters<Real>& sources, const Clusters<Real>& own, const ShortRange<Real>& law,
+                               bool with_potential, SlotField<Real>& field) {
   const ClusterArrays<Real> targets = own.arrays();
   const ClusterArrays<Real> source_arrays = sources.arrays();
   const ClusterColumns columns = sources.columns();
-  std::int64_t pairs = 0;
-#pragma omp parallel for num_threads(threads_) schedule(dynamic, 1) reduction(+ : pairs)
+#pragma omp parallel for num_threads(threads_) schedule(dynamic, 1)
   for (std::int64_t begin = 0; begin < targets.count; begin += kClusterGroup) {
-    std::int64_t count = 0;
     sum_near(
         NearTask<Real>{targets,
                        begin,
@@ -85,10 +84,8 @@ double NearField<Real>::add_from(const Clusters<Real>& sources, const Clusters<R
                        columns,
                        &law,
                        {field[0].data(), field[1].data(), field[2].data(), with_potential ? field[3].data() : nullptr},
-                       &count});
-    pairs += count;
+                       pairs_.data()});
   }
-  return static_cast<double>(pairs);
 }
 
 template class NearField<float>;

@@ -116,7 +116,7 @@ struct PairLoop {
 
   void work_off(SourceList<Real>& list, std::int64_t cluster) const {
     for (std::int64_t l = 0; l < kClusterSize; l += V::kLanes) sum_over(list, cluster * kClusterSize + l);
-    *task.pairs += static_cast<std::int64_t>(list.count) * kClusterSize;
+    task.pairs[cluster] += list.count;
     list.count = 0;
   }
 

@@ -7,12 +7,12 @@
 
 namespace breccia::gravity {
 
-/// kSort is all that grows with the particles alone: sorting, clusters, trees and their moments where one tree holds
-/// everything. kPairs is the near field or the direct sum, kTree the walk and the trees of several sets.
-enum class Phase { kBoxes, kSort, kAssign, kTransform, kInterpolate, kPairs, kTree, kCount };
+/// kSort is all that grows with the particles alone: sorting, clusters, trees and their moments. kPairs is the near
+/// field or the direct sum, kExchange the choice and transport of locally essential trees, kTree the walk.
+enum class Phase { kBoxes, kSort, kAssign, kTransform, kInterpolate, kPairs, kExchange, kTree, kCount };
 inline constexpr int kPhases = static_cast<int>(Phase::kCount);
-inline constexpr std::array<const char*, kPhases> kPhaseNames{"boxes",       "sort",  "assign", "transform",
-                                                              "interpolate", "pairs", "tree"};
+inline constexpr std::array<const char*, kPhases> kPhaseNames{"boxes",       "sort",  "assign",   "transform",
+                                                              "interpolate", "pairs", "exchange", "tree"};
 
 struct Phases {
   std::array<double, kPhases> seconds{};

@@ -63,6 +63,8 @@ void TreePm<Real>::evaluate_in(const Layout& layout, ParticlesView particles, st
 
   std::fill(acceleration.begin(), acceleration.end(), Vec3d{});
   std::fill(potential.begin(), potential.end(), 0.0);
+  work_.assign(acceleration.size(), 0.0);
+  const FieldView field{acceleration, potential, work_};
   for (std::size_t k = 0; k < layout.boxes.size(); ++k) {
     const BoxSettings settings{.box = layout.boxes[k],
                                .cell = layout.cell,
@@ -71,12 +73,10 @@ void TreePm<Real>::evaluate_in(const Layout& layout, ParticlesView particles, st
                                .cutoff = parameters_.mesh.cutoff,
                                .softening = parameters_.softening,
                                .mass_unit = mass_unit};
-    fields_[k].add_to(particles, layout.set, static_cast<std::uint8_t>(k + 1), settings, acceleration, potential,
-                      stats_);
+    fields_[k].add_to(particles, layout.set, static_cast<std::uint8_t>(k + 1), settings, field, stats_);
   }
-  stats_.phases.time(Phase::kTree, [&] {
-    unsplit_.add_to(particles, layout.set, stats_.boxes + 1, mass_unit, acceleration, potential, stats_);
-  });
+  const bool all_in_one = stats_.boxes == 1 && !comm_.any(std::ranges::count(layout.set, std::uint8_t{0}) > 0);
+  if (!all_in_one) unsplit_.add_to(particles, layout.set, stats_.boxes + 1, mass_unit, field, stats_);
   remove_net_force(particles, acceleration, comm_, stats_);
   stats_.bytes_sent += stats_.phases.bytes_sent;
 }

@@ -6,8 +6,8 @@
 
 #include "gravity/mesh/box_field.hpp"
 #include "gravity/mesh/layout.hpp"
-#include "gravity/mesh/unsplit.hpp"
 #include "gravity/solver.hpp"
+#include "gravity/tree/unsplit.hpp"
 
 namespace breccia::gravity {
 
@@ -21,6 +21,7 @@ class TreePm final : public Solver {
   void evaluate_in(const Layout& layout, ParticlesView particles, std::span<Vec3d> acceleration,
                    std::span<double> potential);
   [[nodiscard]] const Stats& last() const override { return stats_; }
+  [[nodiscard]] std::span<const double> work() const override { return work_; }
 
  private:
   Parameters parameters_;
@@ -29,6 +30,7 @@ class TreePm final : public Solver {
   Stats stats_;
   std::vector<BoxField<Real>> fields_;
   UnsplitField unsplit_;
+  std::vector<double> work_;
 };
 
 }  // namespace breccia::gravity

@@ -11,10 +11,13 @@ namespace breccia::gravity {
 inline constexpr std::int64_t kLeafParticles = 16;
 inline constexpr std::int64_t kGroupParticles = 128;
 
+inline constexpr std::int32_t kStub = -1;
+
 /// Lengths in Root::unit, masses in the caller's unit, G = 1. Children follow each other and come after their parent.
 /// What the walk asks for fills one cache line.
 struct alignas(64) Cell {
-  std::int32_t first_child = 0, children = 0;
+  std::int32_t first_child = 0;
+  std::int32_t children = 0;        ///< kStub: unknown here
   std::int32_t begin = 0, end = 0;  ///< particles in this rank's arrays
   std::int64_t count = 0;           ///< particles, those of all ranks
   double radius = 0.0;              ///< no particle is farther from the centre
@@ -23,7 +26,9 @@ struct alignas(64) Cell {
   std::int32_t key_bits = 0;        ///< leading key bits its particles share
   bool is_target = true;            ///< holds particles whose field this rank computes
 
-  [[nodiscard]] bool is_leaf() const { return children == 0; }
+  [[nodiscard]] bool is_leaf() const { return children <= 0; }
+  /// Has children or particles that this rank does not know.
+  [[nodiscard]] bool is_stub() const { return children < 0; }
   /// Targets below this cell share its interactions.
   [[nodiscard]] bool is_group() const { return count <= kGroupParticles || is_leaf(); }
 };

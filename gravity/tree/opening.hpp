@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cmath>
+#include <cstdint>
 
 #include "gravity/tree/cell.hpp"
 
@@ -16,6 +17,9 @@ inline constexpr double kLargestOpening = 0.8;
 /// place, equal errors cost a fifth more.
 inline constexpr double kOctupole = 0.1;
 
+/// A cell of so few particles costs less as particles.
+inline constexpr std::int64_t kFewParticles = 2;
+
 enum class Opening {
   kOpen,    ///< its children, or its particles
   kWhole,   ///< monopole and quadrupole at each target
@@ -26,13 +30,13 @@ namespace detail {
 inline double square(double x) { return x * x; }
 
 /// All terms of the fourth order, x = (b + R)/D bounding the ratio of one to the next, and the octupole:
-/// M (x^4/(1-x)^2 + kOctupole (b/D)^3)/D^2 < largest_error, for x < 1.
-inline bool expandable(const Cell& source, const Cell& target, double d2, double inverse_distance,
-                       double largest_error) {
-  const double x = (source.radius + target.radius) * inverse_distance;
-  const double b = source.radius * inverse_distance;
-  const double rest = square(1.0 - x);
-  return source.moments.mass * (square(square(x)) + kOctupole * (b * b * b) * rest) < largest_error * d2 * rest;
+/// M (x^4/(1-x)^2 + kOctupole (b/D)^3)/D^2 < largest_error, for x < 1; here without a division.
+inline bool expandable(const Cell& source, double size, double distance, double largest_error) {
+  const double b = source.radius;
+  const double d2 = distance * distance;
+  const double rest = square(distance - size);
+  return source.moments.mass * (square(square(size)) * distance + kOctupole * (b * b * b) * rest) <
+         largest_error * rest * (d2 * d2 * distance);
 }
 }  // namespace detail
 
@@ -40,8 +44,9 @@ inline bool expandable(const Cell& source, const Cell& target, double d2, double
 inline bool expandable(const Cell& source, const Cell& target, double largest_error) {
   const Vec3d d = target.centre - source.centre;
   const double d2 = dot(d, d);
-  if (detail::square(source.radius + target.radius) >= detail::square(kLargestOpening) * d2) return false;
-  return detail::expandable(source, target, d2, 1.0 / std::sqrt(d2), largest_error);
+  const double size = source.radius + target.radius;
+  if (size * size >= detail::square(kLargestOpening) * d2) return false;
+  return detail::expandable(source, size, std::sqrt(d2), largest_error);
 }
 
 /// The cheapest way to take `source` for the particles of the group `target`. Seen whole, what is missing is the
@@ -52,7 +57,7 @@ inline Opening opening(const Cell& source, const Cell& target, double largest_er
   if (d2 <= detail::square(target.radius + source.radius / kLargestOpening)) return Opening::kOpen;
   const double distance = std::sqrt(d2);
   const double size = source.radius + target.radius;
-  if (size < kLargestOpening * distance && detail::expandable(source, target, d2, 1.0 / distance, largest_error)) {
+  if (size < kLargestOpening * distance && detail::expandable(source, size, distance, largest_error)) {
     return Opening::kExpand;
   }
   const double nearest = distance - target.radius;

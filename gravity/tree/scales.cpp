@@ -78,25 +78,33 @@ double scale_of(const Tree& tree, const Cell& group, double softening, Sampling&
   return least;
 }
 
+// What the whole of another tree does to a cell; inside that tree it says nothing.
+double pull_of_whole(const Cell& whole, const Cell& cell) {
+  const Vec3d d = cell.centre - whole.centre;
+  const double farthest = std::sqrt(dot(d, d)) + cell.radius;
+  return farthest > whole.radius ? whole.moments.mass / (farthest * farthest) : 0.0;
+}
+
 }  // namespace
 
-std::vector<double> acceleration_scales(const Tree& tree, double softening, int threads, const mpi::Comm& comm) {
-  const std::vector<std::int32_t> groups = tree.groups();
-  std::vector<std::int32_t> targets;
-  std::copy_if(groups.begin(), groups.end(), std::back_inserter(targets),
-               [&](std::int32_t g) { return tree.cell(g).is_target; });
-  std::vector<double> of_groups(targets.size());
+std::vector<double> acceleration_scales(const Tree& tree, std::span<const Cell> others, double softening, int threads) {
+  std::vector<std::int32_t> targets = tree.groups();
+  std::erase_if(targets, [&](std::int32_t g) { return !tree.cell(g).is_target; });
+  std::vector<double> scales(tree.cells.size(), std::numeric_limits<double>::max());
   std::vector<Sampling> sampling(static_cast<std::size_t>(threads));
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
   for (std::size_t g = 0; g < targets.size(); ++g) {
-    of_groups[g] =
-        scale_of(tree, tree.cell(targets[g]), softening, sampling[static_cast<std::size_t>(omp_get_thread_num())]);
+    const Cell& group = tree.cell(targets[g]);
+    double scale = scale_of(tree, group, softening, sampling[static_cast<std::size_t>(omp_get_thread_num())]);
+    for (const Cell& other : others) scale = std::max(scale, pull_of_whole(other, group));
+    scales[static_cast<std::size_t>(targets[g])] = scale;
   }
-  if (comm.size() > 1) of_groups = comm.allgather_arrays(std::span<const double>(of_groups));
+  take_least_of_children(tree, scales.size(), scales);
+  return scales;
+}
 
-  std::vector<double> scales(tree.cells.size(), 0.0);
-  for (std::size_t g = 0; g < groups.size(); ++g) scales[static_cast<std::size_t>(groups[g])] = of_groups[g];
-  for (std::size_t i = tree.cells.size(); i-- > 0;) {
+void take_least_of_children(const Tree& tree, std::size_t count, std::vector<double>& scales) {
+  for (std::size_t i = count; i-- > 0;) {
     const Cell& cell = tree.cells[i];
     if (cell.is_group()) continue;
     double least = std::numeric_limits<double>::max();
@@ -105,7 +113,6 @@ std::vector<double> acceleration_scales(const Tree& tree, double softening, int 
     }
     scales[i] = least;
   }
-  return scales;
 }
 
 }  // namespace breccia::gravity

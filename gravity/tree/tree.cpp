@@ -13,24 +13,11 @@ namespace {
 constexpr int kMostChildren = 8;
 constexpr std::uint32_t kRootStream = 0x67726176;
 
-// The radius of larger cells follows from their children, which is up to twice too large.
-constexpr std::int64_t kExactRadius = 4096;
-
 std::uint64_t prefix(std::uint64_t key, int bits) { return bits == 0 ? 0 : key >> (kKeyBits - bits); }
 
 double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
 
 Sym3<double> square(Vec3d d) { return {d.x * d.x, d.y * d.y, d.z * d.z, d.x * d.y, d.x * d.z, d.y * d.z}; }
-
-double exact_radius(const SortedParticles& p, const Cell& cell) {
-  double farthest = 0.0;
-  for (std::int64_t i = cell.begin; i < cell.end; ++i) {
-    const Vec3d d = p.position(i) - cell.centre;
-    farthest = std::max(farthest, dot(d, d));
-  }
-  // Rounded up: a particle must not stick out.
-  return std::sqrt(farthest) * (1.0 + 1e-12);
-}
 
 void set_leaf_moments(const SortedParticles& p, Cell& cell) {
   Vec3d weighted{};
@@ -48,7 +35,6 @@ void set_leaf_moments(const SortedParticles& p, Cell& cell) {
     cell.moments.second =
         cell.moments.second + p.mass[static_cast<std::size_t>(i)] * square(p.position(i) - cell.centre);
   }
-  cell.radius = exact_radius(p, cell);
 }
 
 }  // namespace
@@ -194,7 +180,24 @@ std::vector<std::int32_t> Tree::groups() const {
 }
 
 void Tree::set_moments(Cell& c) const {
-  if (c.is_leaf()) return set_leaf_moments(particles, c);
+  if (c.is_leaf()) {
+    set_leaf_moments(particles, c);
+  } else {
+    combine_children(c);
+  }
+  if (c.is_leaf() || c.count <= kExactRadius) c.radius = enclosing_radius(farthest_squared(c));
+}
+
+double Tree::farthest_squared(const Cell& c) const {
+  double farthest = 0.0;
+  for (std::int64_t i = c.begin; i < c.end; ++i) {
+    const Vec3d d = particles.position(i) - c.centre;
+    farthest = std::max(farthest, dot(d, d));
+  }
+  return farthest;
+}
+
+void Tree::combine_children(Cell& c) const {
   Vec3d weighted{};
   Vec3d mean{};
   double mass = 0.0;
@@ -211,7 +214,7 @@ void Tree::set_moments(Cell& c) const {
     c.moments.second = c.moments.second + child.moments.second + child.moments.mass * square(d);
     radius = std::max(radius, norm(d) + child.radius);
   }
-  c.radius = c.count <= kExactRadius ? exact_radius(particles, c) : radius;
+  c.radius = radius;
 }
 
 }  // namespace breccia::gravity

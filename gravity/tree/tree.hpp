@@ -4,6 +4,7 @@
 // leaves then are filled to between half and all of their limit wherever the root cube happens to lie.
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -15,7 +16,7 @@
 
 namespace breccia::gravity {
 
-/// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree that every rank knows.
+/// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree, of which scales are sampled.
 inline constexpr std::int64_t kCoarseCells = 1024;
 
 /// How a cell splits: its children differ in `bits` key bits after the first `start`.
@@ -27,21 +28,35 @@ struct Split {
 /// `low` and `high`: smallest and largest key of the cell, of all ranks; bits = 0 for a leaf.
 Split split_of(std::int64_t count, int key_bits, std::uint64_t low, std::uint64_t high);
 
-/// A cell of more particles is split on all ranks together.
+/// Cells of more particles belong to the coarse tree.
 std::int64_t coarse_limit(std::int64_t all_particles);
 
-/// Sorted particles, coordinates scaled (Root::scaled).
+/// Sorted particles, coordinates scaled (Root::scaled). What other ranks sent (SharedTree) follows and has no key and
+/// no order.
 struct SortedParticles {
   std::vector<double> x, y, z, mass;
   std::vector<std::uint64_t> key;
   std::vector<std::int64_t> order;  ///< index of each in the caller's arrays
 
-  [[nodiscard]] std::int64_t size() const { return static_cast<std::int64_t>(x.size()); }
+  /// Those whose field is wanted here.
+  [[nodiscard]] std::int64_t size() const { return static_cast<std::int64_t>(key.size()); }
+  void append(Vec3d position, double m) {
+    x.push_back(position.x);
+    y.push_back(position.y);
+    z.push_back(position.z);
+    mass.push_back(m);
+  }
   [[nodiscard]] Vec3d position(std::int64_t i) const {
     const auto k = static_cast<std::size_t>(i);
     return {x[k], y[k], z[k]};
   }
 };
+
+/// The radius of cells of more particles follows from their children.
+inline constexpr std::int64_t kExactRadius = 4096;
+
+/// What encloses particles at this square of a distance. Rounded up: a particle must not stick out.
+inline double enclosing_radius(double farthest_squared) { return std::sqrt(farthest_squared) * (1.0 + 1e-12); }
 
 class Tree {
  public:
@@ -57,6 +72,10 @@ class Tree {
 
   /// Moments of an inner cell from its children, of a leaf from its particles.
   void set_moments(Cell& cell) const;
+  /// Moments of an inner cell from its children, and a radius that is up to twice too large.
+  void combine_children(Cell& cell) const;
+  /// Square of the distance of the farthest of this rank's particles in the cell from its centre.
+  [[nodiscard]] double farthest_squared(const Cell& cell) const;
 
   /// Cells whose particles share their interactions, in the order of their particles: the largest that are no
   /// more than kGroupParticles or cannot be split.

@@ -13,6 +13,7 @@ namespace breccia::gravity {
 struct FieldSums {
   std::vector<double> acceleration[3];
   std::vector<double> potential;  ///< empty: not wanted
+  std::vector<double> work;       ///< what each particle cost, in pairs of particles
 
   void reset(std::int64_t particles, bool with_potential);
 };
@@ -22,6 +23,7 @@ struct InteractionCounts {
   double pairs = 0.0;       ///< particle with particle
   double cells = 0.0;       ///< particle with cell
   double expansions = 0.0;  ///< cell with cell
+  double missing = 0.0;     ///< cells that should have been opened but were not here; none in an essential tree
 
   InteractionCounts& operator+=(const InteractionCounts& b);
 };

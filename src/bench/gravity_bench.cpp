@@ -3,14 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <nlohmann/json.hpp>
-#include <numeric>
 #include <optional>
 
 #include "bench/cpu_time.hpp"
 #include "bench/gravity_states.hpp"
 #include "bench/json_output.hpp"
+#include "gravity/method.hpp"
 #include "gravity/points.hpp"
 #include "gravity/solver.hpp"
 #include "gravity/verify.hpp"
@@ -26,6 +27,26 @@ constexpr std::int64_t kLargestBody = 100'000;
 // Particles summed directly per slice: long enough to time, short enough to follow each evaluation.
 constexpr std::int64_t kSlicePairs = 1'000'000'000;
 
+// The slab of x of this rank, of equal numbers of particles; all of a state are on every rank.
+struct Share {
+  explicit Share(const GravityState& state) {
+    const mpi::Comm comm;
+    const auto all = static_cast<std::int64_t>(state.position.size());
+    const auto cut = [&](int r) { return static_cast<std::size_t>(all * r / comm.size()); };
+    first = cut(comm.rank());
+    count = cut(comm.rank() + 1) - first;
+    view = {std::span(state.position).subspan(first, count), std::span(state.mass).subspan(first, count)};
+  }
+  std::size_t first = 0, count = 0;
+  gravity::ParticlesView view;
+};
+
+// Of the slowest rank; wall time unless one thread on one rank does all.
+double seconds_since(Timing start, int threads) {
+  const mpi::Comm comm;
+  return comm.max(since(start, threads * comm.size()));
+}
+
 // Seconds the float direct sum would take, from a slice of its targets.
 class DirectSlice {
  public:
@@ -33,10 +54,11 @@ class DirectSlice {
     points_.fill({state.position, state.mass}, state.mass.front());
     const auto n = static_cast<std::int64_t>(state.position.size());
     groups_ = std::clamp<std::int64_t>(kSlicePairs / n / gravity::kTargetGroup, 1, n / gravity::kTargetGroup);
-    scale_ = static_cast<double>(n) / static_cast<double>(groups_ * gravity::kTargetGroup);
+    scale_ = static_cast<double>(n) / static_cast<double>(groups_ * gravity::kTargetGroup * mpi::Comm().size());
     for (auto& s : sums_) s.assign(static_cast<std::size_t>(gravity::padded(n)), 0.0);
   }
   double seconds() {
+    mpi::Comm().barrier();
     const Timing start = now();
 #pragma omp parallel for num_threads(threads_) schedule(static)
     for (std::int64_t g = 0; g < groups_; ++g) {
@@ -49,7 +71,7 @@ class DirectSlice {
                                          .acceleration = {sums_[0].data(), sums_[1].data(), sums_[2].data()},
                                          .potential = nullptr});
     }
-    return scale_ * since(start, threads_);
+    return scale_ * seconds_since(start, threads_);
   }
 
  private:
@@ -76,54 +98,75 @@ struct Measured {
   gravity::Stats stats;
 };
 
-Vec3d mean_acceleration(const GravityState& state, std::span<const Vec3d> a) {
-  Vec3d force{};
-  double mass = 0.0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(state.body); ++i) {
-    force += state.mass[i] * a[i];
-    mass += state.mass[i];
-  }
-  return (1.0 / mass) * force;
-}
-
 double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
 
-// What one state is measured against, computed once.
+// What one state is measured against, computed once: direct sums of a sample, and of the whole first body.
 class Reference {
  public:
-  Reference(const GravityState& state, int threads) : state_(state) {
-    if (state.body > kLargestBody) return;
-    std::vector<std::int64_t> body(static_cast<std::size_t>(state.body));
-    std::iota(body.begin(), body.end(), 0);
-    const mpi::Comm self(MPI_COMM_SELF);
-    pull_ = mean_acceleration(
-        state, gravity::direct_acceleration({state.position, state.mass}, body, state.softening, self, threads));
+  Reference(const GravityState& state, const Share& share, int threads) : state_(state), share_(share) {
+    const auto all = static_cast<std::int64_t>(state.position.size());
+    for (std::int64_t k = 0; k < std::min(kVerified, all); ++k) {
+      const auto i = static_cast<std::size_t>(all * k / std::min(kVerified, all));
+      if (i >= share.first && i < share.first + share.count)
+        sample_.push_back(static_cast<std::int64_t>(i - share.first));
+    }
+    exact_ = gravity::direct_acceleration(share.view, sample_, state.softening, comm_, threads);
+    if (std::count(state.in_body.begin(), state.in_body.end(), 1) > kLargestBody) return;
+    std::vector<std::int64_t> body;
+    for (std::size_t i = 0; i < share.count; ++i) {
+      if (state.in_body[share.first + i] != 0) body.push_back(static_cast<std::int64_t>(i));
+    }
+    std::vector<Vec3d> pull(share.count);
+    const std::vector<Vec3d> exact = gravity::direct_acceleration(share.view, body, state.softening, comm_, threads);
+    for (std::size_t k = 0; k < body.size(); ++k) pull[static_cast<std::size_t>(body[k])] = exact[k];
+    pull_ = body_acceleration(pull);
+  }
+  [[nodiscard]] gravity::FieldErrors errors(std::span<const Vec3d> a) const {
+    std::vector<Vec3d> is;
+    for (const std::int64_t i : sample_) is.push_back(a[static_cast<std::size_t>(i)]);
+    return gravity::field_errors(is, exact_, comm_);
   }
   // Spurious acceleration of the body over the true pull on it.
   [[nodiscard]] std::optional<double> body_error(std::span<const Vec3d> a) const {
     if (!pull_) return std::nullopt;
-    return norm(mean_acceleration(state_, a) - *pull_) / norm(*pull_);
+    return norm(body_acceleration(a) - *pull_) / norm(*pull_);
   }
 
  private:
+  [[nodiscard]] Vec3d body_acceleration(std::span<const Vec3d> a) const {
+    std::array<double, 4> sums{};
+    for (std::size_t i = 0; i < share_.count; ++i) {
+      if (state_.in_body[share_.first + i] == 0) continue;
+      const double m = state_.mass[share_.first + i];
+      const double values[4] = {m * a[i].x, m * a[i].y, m * a[i].z, m};
+      for (std::size_t k = 0; k < 4; ++k) sums[k] += values[k];
+    }
+    comm_.sum(std::span<double>(sums));
+    return (1.0 / sums[3]) * Vec3d{sums[0], sums[1], sums[2]};
+  }
+
   const GravityState& state_;
+  const Share& share_;
+  mpi::Comm comm_;
+  std::vector<std::int64_t> sample_;
+  std::vector<Vec3d> exact_;
   std::optional<Vec3d> pull_;
 };
 
-Measured measure(const GravityState& state, const Reference& reference, DirectSlice& slice, const Setting& setting,
+Measured measure(const Share& share, const Reference& reference, DirectSlice& slice, const Setting& setting,
                  const GravityBenchOptions& options) {
-  const mpi::Comm self(MPI_COMM_SELF);
-  const gravity::ParticlesView view{state.position, state.mass};
-  const auto solver = gravity::make_solver(setting.kind, setting.parameters, self, options.threads);
-  std::vector<Vec3d> acceleration(state.position.size());
+  const mpi::Comm comm;
+  const auto solver = gravity::make_solver(setting.kind, setting.parameters, comm, options.threads);
+  std::vector<Vec3d> acceleration(share.count);
   Measured best;
   for (int k = 0; k < options.pairs; ++k) {
+    comm.barrier();
     const Timing start = now();
-    solver->evaluate(view, acceleration, {});
-    best.seconds = std::min(best.seconds, since(start, options.threads));
+    solver->evaluate(share.view, acceleration, {});
+    best.seconds = std::min(best.seconds, seconds_since(start, options.threads));
     best.direct = std::min(best.direct, slice.seconds());
   }
-  best.errors = verify(view, acceleration, state.softening, kVerified, self, options.threads);
+  best.errors = reference.errors(acceleration);
   best.body_momentum = reference.body_error(acceleration);
   best.stats = solver->last();
   return best;
@@ -150,43 +193,74 @@ std::vector<Setting> settings(const GravityBenchOptions& options, double softeni
   return list;
 }
 
+nlohmann::ordered_json as_json(char state, std::int64_t n, const Setting& setting, const Measured& m, int threads) {
+  const mpi::Comm comm;
+  nlohmann::ordered_json row{{"state", std::string(1, state)},
+                             {"particles", n},
+                             {"method", setting.method},
+                             {"setting", setting.name},
+                             {"chosen", gravity::name_of(m.stats.method)},
+                             {"threads", threads},
+                             {"ranks", comm.size()},
+                             {"seconds", m.seconds},
+                             {"direct_seconds", m.direct},
+                             {"ratio_to_direct", m.direct / m.seconds},
+                             {"rms", m.errors.rms},
+                             {"p99", m.errors.p99},
+                             {"max", m.errors.max},
+                             {"net_momentum", m.stats.momentum_error},
+                             {"boxes", m.stats.boxes},
+                             {"pairs", comm.sum(m.stats.pairs)}};
+  row["body_momentum"] = m.body_momentum ? nlohmann::ordered_json(*m.body_momentum) : nullptr;
+  row["cell_interactions"] = comm.sum(m.stats.cell_interactions);
+  row["expansions"] = comm.sum(m.stats.expansions);
+  row["most_bytes_sent"] = comm.max(m.stats.bytes_sent);
+  row["most_cells_imported"] = comm.max(m.stats.cells_imported);
+  row["most_particles_imported"] = comm.max(m.stats.particles_imported);
+  for (std::size_t k = 0; k < m.stats.phases.seconds.size(); ++k) {
+    row["phases"][gravity::kPhaseNames[k]] = comm.max(m.stats.phases.seconds[k]);
+  }
+  return row;
+}
+
+void print(std::FILE* table, const nlohmann::ordered_json& row) {
+  const auto number = [&](const char* key) { return row[key].is_null() ? NAN : row[key].get<double>(); };
+  const double n = number("particles");
+  fmt::print(table,
+             "{:<5} {:>9} {:<8} {:<16} {:>9.1f} {:>7.1f} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.2f} {:>9.3g}\n",
+             row["state"].get<std::string>(), n, row["method"].get<std::string>(), row["setting"].get<std::string>(),
+             1e3 * number("seconds"), number("ratio_to_direct"), number("rms"), number("p99"), number("max"),
+             number("body_momentum"), 1e-9 * n * n / number("direct_seconds"), 1e-6 * number("most_bytes_sent"));
+  std::fflush(table);
+}
+
 }  // namespace
 
 void run_gravity_bench(const GravityBenchOptions& options) {
+  const mpi::Comm comm;
   std::vector<std::int64_t> sizes = options.particles;
   if (sizes.empty())
     sizes = options.quick ? std::vector<std::int64_t>{94648} : std::vector<std::int64_t>{94648, 1000000};
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
   std::FILE* table = options.json == "-" ? stderr : stdout;
-  fmt::print(table, "{:<5} {:>9} {:<8} {:<16} {:>9} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "state", "particles",
-             "method", "setting", "ms", "ratio", "rms", "p99", "max", "body", "Gpair/s");
+  if (comm.is_root()) {
+    fmt::print(table, "{:<5} {:>9} {:<8} {:<16} {:>9} {:>7} {:>9} {:>9} {:>9} {:>9} {:>9} {:>9}\n", "state",
+               "particles", "method", "setting", "ms", "ratio", "rms", "p99", "max", "body", "Gpair/s", "MB sent");
+  }
   for (const std::int64_t n : sizes) {
     for (const char name : options.states) {
       const GravityState state = gravity_state(name, n);
-      const Reference reference(state, options.threads);
+      const Share share(state);
+      const Reference reference(state, share, options.threads);
       DirectSlice slice(state, options.threads);
       for (const Setting& setting : settings(options, state.softening)) {
-        const Measured m = measure(state, reference, slice, setting, options);
-        fmt::print(table, "{:<5} {:>9} {:<8} {:<16} {:>9.1f} {:>7.1f} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.1e} {:>9.2f}\n",
-                   name, n, setting.method, setting.name, 1e3 * m.seconds, m.direct / m.seconds, m.errors.rms,
-                   m.errors.p99, m.errors.max, m.body_momentum.value_or(NAN),
-                   1e-9 * static_cast<double>(n * n) / m.direct);
-        std::fflush(table);
-        nlohmann::ordered_json row{{"state", std::string(1, name)}, {"particles", n},
-                                   {"method", setting.method},      {"setting", setting.name},
-                                   {"threads", options.threads},    {"seconds", m.seconds},
-                                   {"direct_seconds", m.direct},    {"ratio_to_direct", m.direct / m.seconds},
-                                   {"rms", m.errors.rms},           {"p99", m.errors.p99},
-                                   {"max", m.errors.max},           {"net_momentum", m.stats.momentum_error}};
-        for (std::size_t k = 0; k < m.stats.phases.seconds.size(); ++k) {
-          row["phases"][gravity::kPhaseNames[k]] = m.stats.phases.seconds[k];
-        }
-        row["body_momentum"] = m.body_momentum ? nlohmann::ordered_json(*m.body_momentum) : nullptr;
-        results.push_back(row);
+        const Measured m = measure(share, reference, slice, setting, options);
+        results.push_back(as_json(name, n, setting, m, options.threads));
+        if (comm.is_root()) print(table, results.back());
       }
     }
   }
-  write_json(results, options.json);
+  if (comm.is_root()) write_json(results, options.json);
 }
 
 }  // namespace breccia::bench

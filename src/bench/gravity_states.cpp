@@ -1,6 +1,7 @@
 #include "bench/gravity_states.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <string>
 
@@ -79,6 +80,23 @@ class Builder {
   std::uint64_t draws_ = 0;
 };
 
+// As the engine holds particles: those of a block of nodes together, x slowest.
+void sort_by_blocks(GravityState& state, double width) {
+  std::vector<std::array<std::int64_t, 4>> keys;
+  for (std::size_t i = 0; i < state.position.size(); ++i) {
+    const Vec3d p = (1.0 / width) * state.position[i];
+    keys.push_back({std::llround(p.x), std::llround(p.y), std::llround(p.z), static_cast<std::int64_t>(i)});
+  }
+  std::sort(keys.begin(), keys.end());
+  GravityState sorted = state;
+  for (std::size_t k = 0; k < keys.size(); ++k) {
+    const auto from = static_cast<std::size_t>(keys[k][3]);
+    sorted.position[k] = state.position[from];
+    sorted.in_body[k] = state.in_body[from];
+  }
+  state = std::move(sorted);
+}
+
 }  // namespace
 
 GravityState gravity_state(char name, std::int64_t particles) {
@@ -87,14 +105,14 @@ GravityState gravity_state(char name, std::int64_t particles) {
   GravityState state;
   state.softening = 0.05 * std::cbrt(particle_volume * 1.41);
   Builder builder(state, kDensity * particle_volume);
+  std::int64_t body = particles / 2;
   if (name == 'a') {
-    state.body = particles / 2;
-    builder.add_ellipsoid(state.body, {-100e3, 0, 0}, sphere);
-    builder.add_ellipsoid(particles - state.body, {100e3, 0, 0}, sphere);
-  } else if (name == 'b') {
-    state.body = particles * 3 / 4;
-    builder.add_ellipsoid(state.body, {0, 0, 0}, {119e3, 40e3, 40e3});
-    builder.add_ejecta(particles - state.body, 130e3, 2e7);
+    builder.add_ellipsoid(body, {-100e3, 0, 0}, sphere);
+    builder.add_ellipsoid(particles - body, {100e3, 0, 0}, sphere);
+  } else if (name == 'b' || name == 'n' || name == 'f') {
+    body = particles * 3 / 4;
+    builder.add_ellipsoid(body, {0, 0, 0}, {119e3, 40e3, 40e3});
+    builder.add_ejecta(particles - body, 130e3, name == 'b' ? 2e7 : (name == 'n' ? 1e6 : 4e7));
   } else if (name == 'c') {
     // Fragment k is (k+1)^-1 of the largest.
     std::int64_t left = particles * 6 / 10;
@@ -106,13 +124,16 @@ GravityState gravity_state(char name, std::int64_t particles) {
       const double radius = std::cbrt(static_cast<double>(count) * particle_volume * 0.75 / kPi);
       const double r = k == 0 ? 0.0 : 300e3 * std::pow(2e7 / 300e3, builder.random3().x);
       builder.add_ellipsoid(count, r * builder.direction(), {radius, radius, radius});
-      if (k == 0) state.body = count;
+      if (k == 0) body = count;
       left -= count;
     }
     builder.add_ejecta(particles - static_cast<std::int64_t>(state.position.size()), 300e3, 2e7);
   } else {
-    throw UsageError("gravity states are a, b and c; not " + std::string(1, name));
+    throw UsageError("gravity states are a, b, c, n and f; not " + std::string(1, name));
   }
+  state.in_body.assign(state.position.size(), 0);
+  std::fill_n(state.in_body.begin(), body, char{1});
+  sort_by_blocks(state, 4.0 * std::cbrt(1.41 * particle_volume));
   return state;
 }
 

@@ -24,7 +24,7 @@ int measure(int argc, char** argv) {
   breccia::bench::GravityBenchOptions gravity_options;
   CLI::App* gravity = app.add_subcommand("gravity", "time and error of self-gravity");
   gravity->add_flag("--quick", gravity_options.quick, "94,648 particles only");
-  gravity->add_option("--states", gravity_options.states, "some of a, b, c");
+  gravity->add_option("--states", gravity_options.states, "some of a, b, c, n, f");
   gravity->add_option("--particles", gravity_options.particles, "numbers of particles");
   gravity->add_option("--opening", gravity_options.openings, "tolerances of the tree");
   gravity->add_option("--threads", gravity_options.threads, "threads");

@@ -15,6 +15,9 @@ void GravityRecord::add(const gravity::Stats& stats) {
   sums_.cell_interactions += stats.cell_interactions;
   sums_.expansions += stats.expansions;
   sums_.bytes_sent += stats.bytes_sent;
+  sums_.cells_imported = std::max(sums_.cells_imported, stats.cells_imported);
+  sums_.particles_imported = std::max(sums_.particles_imported, stats.particles_imported);
+  sums_.cells_missing += stats.cells_missing;
   sums_.momentum_error = std::max(sums_.momentum_error, stats.momentum_error);
 }
 
@@ -27,6 +30,9 @@ nlohmann::json GravityRecord::summary(const mpi::Comm& comm) const {
           {"cell_interactions", comm.sum(sums_.cell_interactions)},
           {"expansions", comm.sum(sums_.expansions)},
           {"bytes_sent", comm.sum(sums_.bytes_sent)},
+          {"cells_imported", comm.max(sums_.cells_imported)},
+          {"particles_imported", comm.max(sums_.particles_imported)},
+          {"cells_missing", comm.sum(sums_.cells_missing)},
           {"net_force", sums_.momentum_error}};
 }
 

@@ -15,7 +15,8 @@ class GravityRecord {
   void add(const gravity::Stats& stats);
 
   /// `evaluations` (of each method), `reason` and `boxes` of the last one; `pairs`, `cell_interactions`, `expansions`
-  /// and `bytes_sent` of all ranks; `net_force`, the largest |sum(m a)| over sum(m |a|) found before it was taken off.
+  /// and `bytes_sent` of all ranks; the most `cells_imported` and `particles_imported` by one rank for one evaluation;
+  /// `cells_missing` (Stats); `net_force`, the largest |sum(m a)| over sum(m |a|) found before it was taken off.
   /// Null where there was no evaluation. Collective.
   [[nodiscard]] nlohmann::json summary(const mpi::Comm& comm) const;
 

@@ -174,12 +174,19 @@ class Output {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-void print_profile(const StageTimers& timers, const GravityRecord& gravity, double wall) {
+void print_profile(const StageTimers& timers, const std::string& decision, const nlohmann::json& gravity,
+                   double wall) {
   fmt::print("{:<20} {:>10} {:>7} {:>10}\n", "stage", "seconds", "%", "calls");
   for (const StageTimers::Stage& s : timers.stages()) {
     fmt::print("{:<20} {:>10.3f} {:>7.1f} {:>10}\n", s.name, s.seconds, 100.0 * s.seconds / wall, s.calls);
   }
-  if (!gravity.decision().empty()) fmt::print("gravity at the end: {}\n", gravity.decision());
+  if (gravity.is_null()) return;
+  fmt::print("gravity at the end: {}\n", decision);
+  const auto number = [&](const char* key) { return gravity[key].get<double>(); };
+  fmt::print("  all ranks: {:.3g} pairs, {:.3g} particles with cells, {:.3g} cells with cells, {:.3g} MB sent\n",
+             number("pairs"), number("cell_interactions"), number("expansions"), 1e-6 * number("bytes_sent"));
+  fmt::print("  {} boxes; at most {:.3g} cells and {:.3g} particles of other ranks' trees; net force removed {:.1e}\n",
+             gravity["boxes"].get<int>(), number("cells_imported"), number("particles_imported"), number("net_force"));
 }
 
 std::filesystem::path default_folder(const Scene& scene) { return std::filesystem::path("out") / scene.name; }
@@ -337,7 +344,9 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   summary.gravity = loop.gravity_record().summary(comm);
   summary.scene = options.resolved;
   io::write_summary(options.out / "summary.json", summary, comm);
-  if (options.profile && comm.is_root()) print_profile(loop.timers(), loop.gravity_record(), wall);
+  if (options.profile && comm.is_root()) {
+    print_profile(loop.timers(), loop.gravity_record().decision(), summary.gravity, wall);
+  }
 }
 
 }  // namespace breccia::sim

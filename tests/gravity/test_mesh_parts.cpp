@@ -5,8 +5,10 @@
 #include <random>
 
 #include "breccia/error.hpp"
-#include "gravity/mesh/box_field.hpp"
 #include "gravity/mesh/boxes.hpp"
+#include "gravity/mesh/clusters.hpp"
+#include "gravity/mesh/convolution.hpp"
+#include "gravity/mesh/split.hpp"
 #include "plain_sum.hpp"
 
 namespace breccia::gravity {
@@ -144,58 +146,6 @@ TEST(Clusters, HoldEveryParticleOnceAtItsPlace) {
       EXPECT_NEAR(static_cast<double>(a.centre[axis][cluster]) + static_cast<double>(a.offset[axis][slot]),
                   coordinates[axis], 4e-6);
     }
-  }
-}
-
-// gravity.md 6.1: one mass, test particles at distances from 0.05 cells to the far end of the box.
-TEST(BoxField, PairLawInsideABox) {
-  const mpi::Comm comm;
-  if (comm.size() > 1) GTEST_SKIP() << "the law of one box; gravity_tree_pm compares the ranks";
-  std::mt19937_64 random(1);
-  std::uniform_real_distribution<double> unit(0.0, 1.0);
-  const Box box{{0, 0, 0}, {60, 20, 20}};
-  const double softening = 0.05;
-  struct Case {
-    double split, cutoff, rms;
-  };
-  // The bound is what TSC and 6-point differences leave: it falls with the third power of cell over split scale.
-  for (const Case c : {Case{0.8, 4.5, 6e-3}, Case{1.25, 5.5, 1.2e-3}, Case{2.0, 6.5, 2.5e-4}}) {
-    BoxField<double> field(comm, 1);
-    double square = 0.0;
-    int count = 0;
-    for (int trial = 0; trial < 5; ++trial) {
-      const Vec3d source{60 * unit(random), 20 * unit(random), 20 * unit(random)};
-      std::vector<Vec3d> position{source};
-      std::vector<double> mass{1e15};
-      while (position.size() < 2000) {
-        const double r = 0.05 * std::pow(60.0 / 0.05, unit(random));
-        const double z = 2.0 * unit(random) - 1.0;
-        const double phi = 2.0 * kPi * unit(random);
-        const double s = std::sqrt(1.0 - z * z);
-        const Vec3d p = source + r * Vec3d{s * std::cos(phi), s * std::sin(phi), z};
-        if (!box.contains(p)) continue;
-        position.push_back(p);
-        mass.push_back(0.0);
-      }
-      std::vector<Vec3d> acceleration(position.size());
-      std::vector<double> potential(position.size());
-      Stats stats;
-      field.add_to({position, mass}, std::vector<std::uint8_t>(position.size(), 1), 1,
-                   {box, 1.0, 1.0, c.split, c.cutoff, softening, 1e15}, acceleration, potential, stats);
-      for (std::size_t i = 1; i < position.size(); ++i) {
-        const Vec3d d = source - position[i];
-        const double q = 1.0 / std::sqrt(dot(d, d) + softening * softening);
-        const double strength = kGravitationalConstant * 1e15 * q * q * q;
-        const Vec3d error = acceleration[i] - strength * d;
-        square += dot(error, error) / (strength * strength * dot(d, d));
-        ++count;
-        EXPECT_NEAR(potential[i] / (-kGravitationalConstant * 1e15 * q), 1.0, 5.0 * c.rms);
-      }
-      // The particle itself feels nothing and has no potential of its own, but for the mesh's error at its place.
-      EXPECT_LT(std::sqrt(dot(acceleration[0], acceleration[0])), 1e-12 * kGravitationalConstant * 1e15);
-      EXPECT_LT(std::abs(potential[0]), 0.01 * kGravitationalConstant * 1e15);
-    }
-    EXPECT_LT(std::sqrt(square / count), c.rms) << "split " << c.split;
   }
 }
 

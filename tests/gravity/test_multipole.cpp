@@ -94,6 +94,49 @@ TEST(Multipole, CoefficientsAreDerivativesOfEachOther) {
   EXPECT_NEAR(gradient.z, (value(r + Vec3d{0, 0, h}) - value(r - Vec3d{0, 0, h})) / (2 * h), 1e-9);
 }
 
+// gravity.md 6.9: each coefficient is the derivative of the one before, along each axis, which differences of fourth
+// order find to 1e-10. Third and fourth derivatives are those of the monopole alone.
+TEST(Multipole, CoefficientsAreTheExactDerivatives) {
+  const Vec3d centre{1.5, 1.0, -2.0};
+  for (const bool with_shape : {true, false}) {
+    Source s = symmetric_source(0.5);
+    if (!with_shape) s.moments.second = {};
+    const auto at = [&](Vec3d x) {
+      LocalExpansion<double> l{};
+      add_field_of(s.moments, x, g(x), l);
+      return l;
+    };
+    const LocalExpansion<double> here = at(centre);
+    const double h = 2e-3;
+    const auto derivative = [&](Vec3d along, auto coefficient) {
+      const auto difference = [&](double step) {
+        return coefficient(at(centre + step * along)) - coefficient(at(centre - step * along));
+      };
+      return (8.0 * difference(h) - difference(2.0 * h)) / (12.0 * h);
+    };
+    using Expansion = LocalExpansion<double>;
+    const Vec3d x{1, 0, 0}, y{0, 1, 0}, z{0, 0, 1};
+    const double tolerance = 1e-9;
+    EXPECT_NEAR(derivative(x, [](const Expansion& l) { return l.value; }), here.d1.x, tolerance);
+    EXPECT_NEAR(derivative(z, [](const Expansion& l) { return l.value; }), here.d1.z, tolerance);
+    EXPECT_NEAR(derivative(x, [](const Expansion& l) { return l.d1.x; }), here.d2.xx, tolerance);
+    EXPECT_NEAR(derivative(y, [](const Expansion& l) { return l.d1.x; }), here.d2.xy, tolerance);
+    EXPECT_NEAR(derivative(z, [](const Expansion& l) { return l.d1.y; }), here.d2.yz, tolerance);
+    if (with_shape) continue;
+    EXPECT_NEAR(derivative(x, [](const Expansion& l) { return l.d2.xx; }), here.d3.xxx, tolerance);
+    EXPECT_NEAR(derivative(y, [](const Expansion& l) { return l.d2.xx; }), here.d3.xxy, tolerance);
+    EXPECT_NEAR(derivative(z, [](const Expansion& l) { return l.d2.xy; }), here.d3.xyz, tolerance);
+    EXPECT_NEAR(derivative(y, [](const Expansion& l) { return l.d2.zz; }), here.d3.yzz, tolerance);
+    EXPECT_NEAR(derivative(z, [](const Expansion& l) { return l.d2.zz; }), here.d3.zzz, tolerance);
+    EXPECT_NEAR(derivative(x, [](const Expansion& l) { return l.d3.xxx; }), here.d4.xxxx, tolerance);
+    EXPECT_NEAR(derivative(y, [](const Expansion& l) { return l.d3.xxy; }), here.d4.xxyy, tolerance);
+    EXPECT_NEAR(derivative(z, [](const Expansion& l) { return l.d3.xxy; }), here.d4.xxyz, tolerance);
+    EXPECT_NEAR(derivative(x, [](const Expansion& l) { return l.d3.yzz; }), here.d4.xyzz, tolerance);
+    EXPECT_NEAR(derivative(z, [](const Expansion& l) { return l.d3.yyz; }), here.d4.yyzz, tolerance);
+    EXPECT_NEAR(derivative(z, [](const Expansion& l) { return l.d3.zzz; }), here.d4.zzzz, tolerance);
+  }
+}
+
 TEST(Multipole, ShiftedExpansionIsTheSamePolynomial) {
   const Source s = symmetric_source(0.5);
   const Vec3d centre{3.0, 1.0, -2.0};

@@ -1,0 +1,100 @@
+#include "gravity/mesh/blocks.hpp"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+namespace breccia::gravity {
+namespace {
+
+std::uint64_t hash(BlockIndex index) {
+  const auto part = [](std::int32_t i) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i)); };
+  std::uint64_t h = part(index.x) * 0x9e3779b97f4a7c15ULL;
+  h = (h ^ (h >> 32) ^ part(index.y)) * 0xbf58476d1ce4e5b9ULL;
+  h = (h ^ (h >> 29) ^ part(index.z)) * 0x94d049bb133111ebULL;
+  return h ^ (h >> 31);
+}
+
+bool equal(BlockIndex a, BlockIndex b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+std::int32_t block_coordinate(double x) { return static_cast<std::int32_t>(std::clamp(std::floor(x), -2e9, 2e9)); }
+
+BlockIndex block_of(Vec3d p, double per_width) {
+  return {block_coordinate(per_width * p.x), block_coordinate(per_width * p.y), block_coordinate(per_width * p.z)};
+}
+
+}  // namespace
+
+void Block::add(std::int64_t n, double m, const Box& b) {
+  if (count == 0) bounds = b;
+  count += n;
+  mass += m;
+  bounds.low = {std::min(bounds.low.x, b.low.x), std::min(bounds.low.y, b.low.y), std::min(bounds.low.z, b.low.z)};
+  bounds.high = {std::max(bounds.high.x, b.high.x), std::max(bounds.high.y, b.high.y),
+                 std::max(bounds.high.z, b.high.z)};
+}
+
+std::size_t Blocks::slot_of(BlockIndex index) const {
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t slot = hash(index) & mask;
+  while (slots_[slot] >= 0 && !equal(all_[static_cast<std::size_t>(slots_[slot])].index, index))
+    slot = (slot + 1) & mask;
+  return slot;
+}
+
+Block& Blocks::at(BlockIndex index) {
+  const std::size_t slot = slot_of(index);
+  if (slots_[slot] >= 0) return all_[static_cast<std::size_t>(slots_[slot])];
+  slots_[slot] = static_cast<std::int32_t>(all_.size());
+  all_.push_back({index});
+  if (2 * all_.size() > slots_.size()) grow();
+  return all_.back();
+}
+
+void Blocks::grow() {
+  slots_.assign(4 * slots_.size(), -1);
+  for (std::size_t i = 0; i < all_.size(); ++i) slots_[slot_of(all_[i].index)] = static_cast<std::int32_t>(i);
+}
+
+Blocks count_in_blocks(ParticlesView particles, double width) {
+  Blocks blocks;
+  BlockIndex last{};
+  Block* here = nullptr;
+  const double per_width = 1.0 / width;
+  for (std::size_t i = 0; i < particles.position.size(); ++i) {
+    const Vec3d p = particles.position[i];
+    const BlockIndex index = block_of(p, per_width);
+    // Particles mostly come in the order of space.
+    if (here == nullptr || !equal(index, last)) here = &blocks.at(last = index);
+    here->add(1, particles.mass[i], {p, p});
+  }
+  return blocks;
+}
+
+std::vector<Occupancy> occupancy(ParticlesView particles, double width, const mpi::Comm& comm) {
+  struct Share {
+    BlockIndex index;
+    std::int32_t unused;
+    std::int64_t count;
+  };
+  // Each block is added up on the rank its hash names.
+  const auto ranks = static_cast<std::size_t>(comm.size());
+  std::vector<std::vector<Share>> to(ranks);
+  const Blocks own = count_in_blocks(particles, width);
+  for (const Block& b : own.all()) to[hash(b.index) % ranks].push_back({b.index, 0, b.count});
+  Blocks mine;
+  for (const std::vector<Share>& from : comm.alltoall(to)) {
+    for (const Share& s : from) mine.at(s.index).count += s.count;
+  }
+  std::map<std::int64_t, std::int64_t> number;
+  for (const Block& b : mine.all()) ++number[b.count];
+  std::vector<Occupancy> here;
+  for (const auto& [count, blocks] : number) here.push_back({count, blocks});
+  number.clear();
+  for (const Occupancy& o : comm.allgather_arrays(std::span<const Occupancy>(here))) number[o.particles] += o.blocks;
+  std::vector<Occupancy> all;
+  for (const auto& [count, blocks] : number) all.push_back({count, blocks});
+  return all;
+}
+
+}  // namespace breccia::gravity

@@ -1,0 +1,167 @@
+// How errors are distributed in the states of gravity.md 3, on any number of ranks and however the state lies in space
+// (gravity.md 6.3).
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+
+#include "deal_out.hpp"
+#include "gravity/verify.hpp"
+
+namespace breccia::gravity {
+namespace {
+
+constexpr double kRadius = 5e4;
+constexpr std::size_t kBody = 6000;
+const double kSpacing = kRadius * std::cbrt(4.0 / 3.0 * kPi / static_cast<double>(kBody));
+
+// Errors of the mesh are those of near neighbours, whose pull compares to the body's as spacing to radius: twice that
+// of bodies of 47,324 particles, for which gravity.md 7 gives bounds.
+constexpr double kCoarser = 2.0;
+
+void add_debris(Cloud& cloud, std::size_t count, double nearest, double farthest, std::mt19937_64& random) {
+  std::uniform_real_distribution<double> unit(0.0, 1.0);
+  for (std::size_t i = 0; i < count; ++i) {
+    const double r = nearest * std::pow(farthest / nearest, unit(random));
+    const double z = 2.0 * unit(random) - 1.0;
+    const double phi = 2.0 * kPi * unit(random);
+    const double s = std::sqrt(1.0 - z * z);
+    cloud.position.push_back({r * s * std::cos(phi), r * s * std::sin(phi), r * z});
+    cloud.mass.push_back(3e13);
+  }
+}
+
+// a: two spheres; b: an elongated body and a quarter debris; c: fragments and 40 % debris; t: two spheres in contact;
+// s: a single sphere.
+Cloud state(char name) {
+  Cloud cloud;
+  std::mt19937_64 random(31);
+  if (name == 'a' || name == 't') {
+    const double half = name == 'a' ? 2.0 * kRadius : kRadius;
+    add_rock(cloud, kBody, {-half, 0, 0}, kRadius, random);
+    add_rock(cloud, kBody, {half, 0, 0}, kRadius, random);
+  } else if (name == 'b') {
+    // The part in a long ellipsoid of a lattice as dense as that of the others.
+    Cloud whole;
+    add_rock(whole, 8 * kBody, {}, 2.0 * kRadius, random);
+    for (std::size_t i = 0; i < whole.position.size(); ++i) {
+      const Vec3d x = whole.position[i];
+      if (0.25 * x.x * x.x + 2.0 * (x.y * x.y + x.z * x.z) > kRadius * kRadius) continue;
+      cloud.position.push_back(x);
+      cloud.mass.push_back(3e13);
+    }
+    add_debris(cloud, kBody / 3, 1.3e5, 2e7, random);
+  } else if (name == 'c') {
+    for (std::size_t k = 0; k < 12; ++k) {
+      const std::size_t size = kBody / 3 / (k + 1);
+      std::uniform_real_distribution<double> unit(-1.0, 1.0);
+      const Vec3d at{1e6 * unit(random), 1e6 * unit(random), 1e6 * unit(random)};
+      add_rock(cloud, size, k == 0 ? Vec3d{} : at, kSpacing * std::cbrt(0.75 / kPi * static_cast<double>(size)),
+               random);
+    }
+    add_debris(cloud, 2 * cloud.position.size() / 3, 3e5, 2e7, random);
+  } else {
+    add_rock(cloud, kBody, {}, kRadius, random);
+  }
+  return cloud;
+}
+
+struct Errors {
+  FieldErrors relative;
+  double rms = 0.0;  // of those over max(|a|, a tenth of its mean): no particle at a centre of a body decides it
+};
+
+// Slabs of x, as the ranks of a run hold them.
+Cloud share_of(const Cloud& cloud) {
+  const mpi::Comm comm;
+  Cloud mine;
+  std::vector<double> x;
+  for (const Vec3d& p : cloud.position) x.push_back(p.x);
+  std::sort(x.begin(), x.end());
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    const auto below = std::lower_bound(x.begin(), x.end(), cloud.position[i].x) - x.begin();
+    if (below * comm.size() / static_cast<std::ptrdiff_t>(x.size()) != comm.rank()) continue;
+    mine.position.push_back(cloud.position[i]);
+    mine.mass.push_back(cloud.mass[i]);
+  }
+  return mine;
+}
+
+double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
+
+Errors errors_of(GravityMethod method, const Cloud& cloud) {
+  const mpi::Comm comm;
+  const Cloud mine = share_of(cloud);
+  const ParticlesView view{mine.position, mine.mass};
+  const Parameters parameters{.softening = 0.05 * kSpacing, .mesh = {.particle_spacing = kSpacing}, .error = 3.5e-4};
+  std::vector<Vec3d> a(mine.position.size());
+  make_solver(method, parameters, comm, 1)->evaluate(view, a, {});
+  std::vector<std::int64_t> all(a.size());
+  std::iota(all.begin(), all.end(), 0);
+  const std::vector<Vec3d> exact = direct_acceleration(view, all, parameters.softening, comm, 1);
+
+  double mean = 0.0, square = 0.0;
+  for (const Vec3d& e : exact) mean += norm(e);
+  const auto count = static_cast<double>(cloud.position.size());
+  mean = comm.sum(mean) / count;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const double error = norm(a[i] - exact[i]) / std::max(norm(exact[i]), 0.1 * mean);
+    square += error * error;
+  }
+  return {field_errors(a, exact, comm), std::sqrt(comm.sum(square) / count)};
+}
+
+// The default levels of gravity.md 7; its largest errors are 1.2e-3 to 1e-2 for the tree.
+TEST(Percentiles, OfAllStatesByTree) {
+  for (const char name : {'a', 'b', 'c', 't', 's'}) {
+    const Errors e = errors_of(GravityMethod::kTree, state(name));
+    SCOPED_TRACE(std::string("state ") + name);
+    EXPECT_LT(e.rms, 3.5e-4);
+    EXPECT_LT(e.relative.median, 3.0e-4);
+    EXPECT_LT(e.relative.p99, 1.3e-3);
+    EXPECT_LT(e.relative.max, 5e-3);
+  }
+}
+
+TEST(Percentiles, OfAllStatesByMesh) {
+  for (const char name : {'a', 'b', 'c', 't', 's'}) {
+    const Errors e = errors_of(GravityMethod::kTreePm, state(name));
+    SCOPED_TRACE(std::string("state ") + name);
+    EXPECT_LT(e.rms, kCoarser * 4.5e-4);
+    EXPECT_LT(e.relative.median, kCoarser * 4.0e-4);
+    EXPECT_LT(e.relative.p99, kCoarser * 1.6e-3);
+    // gravity.md 3 finds 2e-2 to 5e-2, at centres of bodies.
+    EXPECT_LT(e.relative.max, kCoarser * 1e-2);
+  }
+}
+
+// Rotation by 0.7 about (1, 2, 3), by Rodrigues' formula, and a shift by no multiple of a cell.
+Cloud moved(Cloud cloud, int times) {
+  const Vec3d axis = (1.0 / std::sqrt(14.0)) * Vec3d{1, 2, 3};
+  const double angle = 0.7 * times;
+  for (Vec3d& x : cloud.position) {
+    x = std::cos(angle) * x + std::sin(angle) * cross(axis, x) + (1.0 - std::cos(angle)) * dot(axis, x) * axis +
+        times * Vec3d{123456.7, -7654.3, 33333.3};
+  }
+  return cloud;
+}
+
+// A cubic lattice along the axes of mesh and tree is the one direction that is not like the others: a lattice beats
+// with the mesh (here 1.25 times the error, 1.45 at 47,000 particles), and a tree cuts it evenly (0.75 times there).
+TEST(Percentiles, DoNotDependOnPlaceAndDirection) {
+  const Cloud aligned = state('a');
+  Cloud shifted = aligned;
+  for (Vec3d& x : shifted.position) x += Vec3d{123456.7, -7654.3, 33333.3};
+  for (const GravityMethod method : {GravityMethod::kTree, GravityMethod::kTreePm}) {
+    SCOPED_TRACE("method " + std::to_string(static_cast<int>(method)));
+    const double here = errors_of(method, aligned).rms;
+    const double oblique = errors_of(method, moved(aligned, 1)).rms;
+    EXPECT_NEAR(errors_of(method, shifted).rms / here, 1.0, 0.2);
+    EXPECT_NEAR(errors_of(method, moved(aligned, 2)).rms / oblique, 1.0, 0.2);
+    EXPECT_NEAR(here / oblique, 1.0, 0.5);
+  }
+}
+
+}  // namespace
+}  // namespace breccia::gravity
