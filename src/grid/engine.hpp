@@ -28,11 +28,11 @@ struct EngineSetup {
   int threads = 1;
 };
 
-/// Sums of a pass over this rank's particles.
+/// What the passes over this rank's particles found.
 struct PassReport {
-  double plastic_work = 0.0;  ///< [J]
-  double viscous_work = 0.0;  ///< [J]
-  double largest_move = 0.0;  ///< [cells]
+  double plastic_work = 0.0;  ///< of all passes since the last sorting [J]
+  double viscous_work = 0.0;  ///< of all passes since the last sorting [J]
+  double largest_move = 0.0;  ///< of the last pass [cells]
 };
 
 /// Fastest signals over all ranks, for the time step.
@@ -101,10 +101,12 @@ class Engine {
   /// only between gather() and scatter().
   virtual bool finish_damage() = 0;
 
-  [[nodiscard]] virtual const PassReport& last_pass() const = 0;
+  /// May wait for a device: not meant for every step.
+  [[nodiscard]] virtual PassReport passes() const = 0;
   [[nodiscard]] virtual EngineStats stats() const = 0;
 };
 
-std::unique_ptr<Engine> make_engine(const EngineSetup& setup, const mpi::Comm& comm);
+/// The engine on host cores.
+std::unique_ptr<Engine> make_host_engine(const EngineSetup& setup, const mpi::Comm& comm);
 
 }  // namespace breccia::grid

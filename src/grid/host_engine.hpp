@@ -57,7 +57,7 @@ class HostEngine final : public Engine {
   [[nodiscard]] double elastic_energy() const override;
   [[nodiscard]] SignalSpeeds signal_speeds() const override;
   bool finish_damage() override;
-  [[nodiscard]] const PassReport& last_pass() const override { return report_; }
+  [[nodiscard]] PassReport passes() const override { return report_; }
   [[nodiscard]] EngineStats stats() const override;
 
  private:

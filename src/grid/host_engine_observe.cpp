@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "grid/host_engine.hpp"
+#include "grid/observation.hpp"
 
 namespace breccia::grid {
 
@@ -53,38 +54,29 @@ ParticleOutput HostEngine<P>::observe() const {
   for (std::uint32_t t = 0; t < tiles_.size(); ++t) kernels_.probe(probe, t);
   kernels_.lone_probe(probe);
 
-  const material::RuntimeEffects& fx = setup_.effects;
-  const double cell_volume = setup_.cell * setup_.cell * setup_.cell;
   ParticleOutput out;
   for_each_particle([&](std::size_t slot, BlockCoord block) {
     const std::size_t pack = slot / kLanes;
     const int lane = static_cast<int>(slot % kLanes);
     const Kinematics<P>& k = store_.kinematics[pack];
-    const MaterialParameters& parameters = setup_.materials[material(slot)];
-    const double ratio = 1.0 + static_cast<double>(store_.volume[pack].change.value()[lane]);
-    const auto mean = [&](int axis) {
-      return 0.5 * (static_cast<double>(k.velocity[axis][lane]) +
-                    static_cast<double>(new_velocity[3 * slot + static_cast<std::size_t>(axis)]));
-    };
-    out.id.push_back(id(slot));
-    out.position.push_back(position(slot, block));
-    out.velocity.push_back({mean(0), mean(1), mean(2)});
-    out.mass.push_back(static_cast<double>(k.mass[lane]));
-    out.body.push_back(static_cast<std::uint32_t>(store_.identity[pack].body_material[lane]) & 0xffffU);
-    out.material.push_back(material(slot));
-    out.density.push_back(parameters.eos.rho0 / ratio);
-    out.grid_density.push_back(static_cast<double>(node_mass[slot]) / cell_volume);
-    out.pressure.push_back(static_cast<double>(store_.volume[pack].kirchhoff_pressure[lane]) / ratio);
-    double damage = fx.fully_damaged ? 1.0 : 0.0;
+    ObservedParticle particle{.id = id(slot),
+                              .position = position(slot, block),
+                              .mass = static_cast<double>(k.mass[lane]),
+                              .node_mass = static_cast<double>(node_mass[slot]),
+                              .body_material = static_cast<std::uint32_t>(store_.identity[pack].body_material[lane]),
+                              .volume_change = static_cast<double>(store_.volume[pack].change.value()[lane]),
+                              .kirchhoff_pressure = static_cast<double>(store_.volume[pack].kirchhoff_pressure[lane])};
+    double* mean[3] = {&particle.velocity.x, &particle.velocity.y, &particle.velocity.z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      *mean[axis] =
+          0.5 * (static_cast<double>(k.velocity[axis][lane]) + static_cast<double>(new_velocity[3 * slot + axis]));
+    }
     if (store_.has(Group::kDamageLevel)) {
-      const auto root = static_cast<double>(store_.damage_level[pack].root[lane]);
-      damage = root * root * root;
+      particle.damage_root = static_cast<double>(store_.damage_level[pack].root[lane]);
     }
-    out.damage.push_back(damage);
-    if (fx.energy) out.internal_energy.push_back(static_cast<double>(store_.energy[pack].specific.value()[lane]));
-    if (fx.shear) {
-      out.shear_stress.push_back(2.0 * parameters.shear_modulus * hencky_norm(slot) / (std::sqrt(2.0) * ratio));
-    }
+    if (setup_.effects.energy) particle.energy = static_cast<double>(store_.energy[pack].specific.value()[lane]);
+    if (setup_.effects.shear) particle.hencky_norm = hencky_norm(slot);
+    append(out, particle, setup_);
   });
   return out;
 }
@@ -96,8 +88,7 @@ double HostEngine<P>::hencky_norm(std::size_t slot) const {
   const Dev3<double> strain{static_cast<double>(e[0][lane]), static_cast<double>(e[1][lane]),
                             static_cast<double>(e[2][lane]), static_cast<double>(e[3][lane]),
                             static_cast<double>(e[4][lane])};
-  const auto powers = material::traceless_powers(strain);
-  return 0.5 * std::sqrt(material::squared_norm(material::deviatoric_log(strain, powers)));
+  return grid::hencky_norm(strain);
 }
 
 template <class P>

@@ -82,6 +82,7 @@ void HostEngine<P>::settle_in_slabs(std::vector<Placement> placements) {
   connect_tiles();
   connect_halo();
   plan_sweep();
+  report_ = {};
 }
 
 template <class P>

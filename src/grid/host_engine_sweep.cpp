@@ -143,7 +143,7 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
       for (const SweepTask& task : phase) run_task(task, arguments, trailing, reports);
     }
   }
-  report_ = {};
+  report_.largest_move = 0.0;
   const auto book = [&](const TileReport& r) {
     report_.plastic_work += r.plastic_work;
     report_.viscous_work += r.viscous_work;

@@ -47,7 +47,7 @@ std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const Resolv
   setup.uniform_gravity = scene.gravity.uniform;
   setup.numerics = scene.numerics;
   setup.threads = threads;
-  return grid::make_engine(setup, comm);
+  return grid::make_host_engine(setup, comm);
 }
 
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,

@@ -49,7 +49,6 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const Eng
     }
   }
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
-  book_pass();
 }
 
 void TimeLoop::make_solver(const ResolvedEffects& effects, int threads) {
@@ -78,7 +77,6 @@ bool TimeLoop::one_step(const Visit& at_window_start) {
   window_.advance();
   if (window_.due() || sorting_due()) {
     timers_("g2p", [&] { engine_->gather(dt_); });
-    book_pass();
     between_steps();
     if (window_.due() && !at_window_start(*this)) return false;
     timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
@@ -86,7 +84,6 @@ bool TimeLoop::one_step(const Visit& at_window_start) {
     timers_("g2p, stress, p2g", [&] { engine_->gather_scatter(dt_); });
     count_step();
   }
-  book_pass();
   return true;
 }
 
@@ -101,7 +98,10 @@ void TimeLoop::count_step() {
 void TimeLoop::between_steps() {
   count_step();
   steps_since_sort_ = 0;
-  const double largest_move = comm_.max(engine_->last_pass().largest_move);
+  const grid::PassReport passes = engine_->passes();
+  lost_.plastic += passes.plastic_work;
+  lost_.viscous += passes.viscous_work;
+  const double largest_move = comm_.max(passes.largest_move);
   timers_("damage", [&] { engine_->finish_damage(); });
   timers_("sort", [&] { engine_->sort(); });
   if (window_.due()) begin_window();
@@ -132,9 +132,9 @@ void TimeLoop::evaluate_gravity() {
   gravity_record_.add(solver_->last());
 }
 
-void TimeLoop::book_pass() {
-  lost_.plastic += engine_->last_pass().plastic_work;
-  lost_.viscous += engine_->last_pass().viscous_work;
+LostWork TimeLoop::lost_work() const {
+  const grid::PassReport passes = engine_->passes();
+  return {lost_.plastic + passes.plastic_work, lost_.viscous + passes.viscous_work};
 }
 
 void TimeLoop::set_sort_interval(double cells_per_step) {

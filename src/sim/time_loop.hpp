@@ -41,7 +41,7 @@ class TimeLoop {
   [[nodiscard]] double dt() const { return dt_; }
   [[nodiscard]] const grid::Engine& engine() const { return *engine_; }
   [[nodiscard]] gravity::Solver* solver() const { return solver_.get(); }
-  [[nodiscard]] const LostWork& lost_work() const { return lost_; }
+  [[nodiscard]] LostWork lost_work() const;
   [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
 
@@ -52,7 +52,6 @@ class TimeLoop {
   void between_steps();
   void begin_window();
   void evaluate_gravity();
-  void book_pass();
   [[nodiscard]] bool sorting_due() const { return steps_since_sort_ + 1 >= sort_interval_; }
   void set_sort_interval(double cells_per_step);
 
@@ -64,7 +63,7 @@ class TimeLoop {
   std::unique_ptr<gravity::Solver> solver_;  // null: no self-gravity
   gravity::Window window_;
   GravityRecord gravity_record_;
-  LostWork lost_;
+  LostWork lost_;  // up to the last sorting
   double time_ = 0.0;
   double dt_ = 0.0;           // of the step that comes
   double previous_dt_ = 0.0;  // of the step that was

@@ -37,6 +37,13 @@ std::size_t live_allocations();
 void launch(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
             std::function<void()> body);
 
+/// Arguments are copied at the launch, as for a device.
+template <class Kernel, class... Arguments>
+void launch_with(const char* name, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream, Kernel kernel,
+                 Arguments... arguments) {
+  launch(name, grid, block, shared_bytes, stream, [=] { kernel(arguments...); });
+}
+
 // What runs inside a kernel.
 dim3 thread_index();
 dim3 block_index();
@@ -64,7 +71,8 @@ unsigned lane_of_warp();
 }  // namespace breccia::cuda_emulation
 
 #define BRECCIA_LAUNCH(kernel, grid, block, shared_bytes, stream, ...) \
-  breccia::cuda_emulation::launch(#kernel, grid, block, shared_bytes, stream, [=] { kernel(__VA_ARGS__); })
+  breccia::cuda_emulation::launch_with(                                \
+      #kernel, grid, block, shared_bytes, stream, [](auto... arguments) { kernel(arguments...); }, __VA_ARGS__)
 #define BRECCIA_SHARED(Type, name) Type& name = *static_cast<Type*>(breccia::cuda_emulation::shared_memory())
 
 // The names are CUDA's.

@@ -1,0 +1,109 @@
+// Particles into the engine and the whole state out of it, in the form that no device determines.
+#include <algorithm>
+#include <cstring>
+
+#include "breccia/error.hpp"
+#include "cuda/cuda_engine.hpp"
+#include "grid/state_columns.hpp"
+
+namespace breccia::cuda {
+
+template <class P>
+void CudaEngine<P>::insert(const ParticleArrays& particles, const material::FlawLists& flaws,
+                           std::span<const Vec3d> spin_of_body) {
+  // The host engine knows how positions become nodes and offsets; once, at the start.
+  const auto host = grid::make_host_engine(setup_, comm_);
+  host->insert(particles, flaws, spin_of_body);
+  restore(host->save());
+}
+
+template <class P>
+EngineState CudaEngine<P>::save() const {
+  EngineState state;
+  state.particles = particles_.count();
+  const auto keys = grid_.block_keys_of_particles(stream_);
+  const auto packed = particles_.template download_component<std::int32_t>("node", 0, stream_);
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    for (int axis = 0; axis < 3; ++axis) {
+      state.node.push_back(grid::kBlockWidth * grid::component(grid::block_coord(keys[i]), axis) +
+                           (packed[i] >> (8 * axis) & 255) - grid::kNodeBias);
+    }
+  }
+  for (const auto& field : particles_.fields()) {
+    if (!grid::saved_as_it_is(*field.descriptor)) continue;
+    StateColumn column = grid::column_for(*field.descriptor, 0);
+    column.values = particles_.download(field, stream_);
+    state.columns.push_back(std::move(column));
+  }
+  if (particles_.groups().flaws) save_flaws(state);
+  state.damage_finished = setup_.effects.fully_damaged;
+  state.smallest_mass = smallest_mass_;
+  return state;
+}
+
+template <class P>
+void CudaEngine<P>::save_flaws(EngineState& state) const {
+  const auto first = particles_.template download_component<std::int32_t>("flaw_first", 0, stream_);
+  const auto count = particles_.template download_component<std::int32_t>("flaw_count", 0, stream_);
+  const std::vector<float> thresholds = flaw_thresholds_.download(flaw_thresholds_.size(), stream_);
+  StateColumn active{grid::kActiveFlaws, "", "flaws that grow", 4, 1, {}};
+  for (std::size_t i = 0; i < count.size(); ++i) {
+    const auto growing = static_cast<std::uint32_t>(count[i] & 0xffff);
+    const auto* bytes = reinterpret_cast<const std::byte*>(&growing);
+    active.values.insert(active.values.end(), bytes, bytes + sizeof growing);
+    const std::int32_t all = count[i] >> 16;
+    state.flaw_count.push_back(static_cast<std::uint32_t>(all));
+    const auto own = thresholds.begin() + first[i];
+    state.flaw_thresholds.insert(state.flaw_thresholds.end(), own, own + all);
+  }
+  state.columns.push_back(std::move(active));
+}
+
+template <class P>
+void CudaEngine<P>::restore(const EngineState& state) {
+  if (state.damage_finished && setup_.effects.damage) switch_damage_off();
+  particles_.allocate(state.particles);
+  std::vector<grid::BlockKey> keys(state.particles);
+  std::vector<std::int32_t> packed(state.particles);
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    const std::int32_t* node = state.node.data() + 3 * i;
+    keys[i] = grid::block_key({node[0] >> 2, node[1] >> 2, node[2] >> 2});
+    for (int axis = 0; axis < 3; ++axis) packed[i] |= ((node[axis] & 3) + grid::kNodeBias) << (8 * axis);
+  }
+  grid_.set_block_keys(keys, stream_);
+  particles_.upload(*particles_.find("node"), reinterpret_cast<const std::byte*>(packed.data()), stream_);
+  for (const auto& field : particles_.fields()) {
+    if (!grid::saved_as_it_is(*field.descriptor)) continue;
+    const StateColumn& column =
+        grid::find_column(state, field.descriptor->name, static_cast<std::size_t>(field.descriptor->element_bytes),
+                          static_cast<std::size_t>(field.descriptor->components));
+    particles_.upload(field, column.values.data(), stream_);
+  }
+  if (particles_.groups().flaws) restore_flaws(state);
+  smallest_mass_ = state.smallest_mass;
+  settle();
+}
+
+template <class P>
+void CudaEngine<P>::restore_flaws(const EngineState& state) {
+  const std::byte* active = grid::find_column(state, grid::kActiveFlaws, 4, 1).values.data();
+  std::vector<std::int32_t> first(state.particles);
+  std::vector<std::int32_t> count(state.particles);
+  std::int32_t next = 0;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    std::int32_t growing = 0;
+    std::memcpy(&growing, active + i * sizeof growing, sizeof growing);
+    first[i] = next;
+    count[i] = growing | static_cast<std::int32_t>(state.flaw_count[i]) << 16;
+    next += static_cast<std::int32_t>(state.flaw_count[i]);
+  }
+  particles_.upload(*particles_.find("flaw_first"), reinterpret_cast<const std::byte*>(first.data()), stream_);
+  particles_.upload(*particles_.find("flaw_count"), reinterpret_cast<const std::byte*>(count.data()), stream_);
+  flaw_thresholds_.allocate(state.flaw_thresholds.size());
+  flaw_thresholds_.upload(state.flaw_thresholds, stream_);
+}
+
+template class CudaEngine<MixedPrecision>;
+template class CudaEngine<DoublePrecision>;
+
+}  // namespace breccia::cuda
