@@ -109,4 +109,7 @@ class Engine {
 /// The engine on host cores.
 std::unique_ptr<Engine> make_host_engine(const EngineSetup& setup, const mpi::Comm& comm);
 
+/// Makes engines of one kind; which one the user wants is decided in grid/device.hpp.
+using EngineMaker = std::unique_ptr<Engine> (*)(const EngineSetup& setup, const mpi::Comm& comm);
+
 }  // namespace breccia::grid

@@ -32,12 +32,12 @@ material::FlawLists draw_all_flaws(const Scene& scene, const ParticleArrays& par
 }  // namespace
 
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
-                                                 const mpi::Comm& comm) {
-  return make_loaded_engine(scene, effects, scene::make_particles(scene, comm), threads, comm);
+                                                 const mpi::Comm& comm, grid::EngineMaker make) {
+  return make_loaded_engine(scene, effects, scene::make_particles(scene, comm), threads, comm, make);
 }
 
 std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
-                                                const mpi::Comm& comm) {
+                                                const mpi::Comm& comm, grid::EngineMaker make) {
   grid::EngineSetup setup;
   setup.cell = scene.cell;
   setup.materials = scene.materials;
@@ -47,12 +47,13 @@ std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const Resolv
   setup.uniform_gravity = scene.gravity.uniform;
   setup.numerics = scene.numerics;
   setup.threads = threads;
-  return grid::make_host_engine(setup, comm);
+  return make(setup, comm);
 }
 
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
-                                                 const ParticleArrays& particles, int threads, const mpi::Comm& comm) {
-  auto engine = make_empty_engine(scene, effects, threads, comm);
+                                                 const ParticleArrays& particles, int threads, const mpi::Comm& comm,
+                                                 grid::EngineMaker make) {
+  auto engine = make_empty_engine(scene, effects, threads, comm, make);
   material::FlawLists flaws;
   if (effects.material.damage) {
     flaws = draw_all_flaws(scene, particles);

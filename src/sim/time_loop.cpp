@@ -8,12 +8,13 @@
 
 namespace breccia::sim {
 
-TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm)
+TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm,
+                   grid::EngineMaker make)
     : scene_(scene),
       viscosity_(effects.material.viscosity),
       adaptive_(!scene.time.step),
       comm_(comm),
-      engine_(make_loaded_engine(scene, effects, threads, comm)),
+      engine_(make_loaded_engine(scene, effects, threads, comm, make)),
       window_(scene.gravity.interval) {
   const grid::SignalSpeeds speeds = engine_->signal_speeds();
   dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
@@ -25,12 +26,12 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
 }
 
 TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const EngineState& engine,
-                   const LoopState& state, int threads, const mpi::Comm& comm)
+                   const LoopState& state, int threads, const mpi::Comm& comm, grid::EngineMaker make)
     : scene_(scene),
       viscosity_(effects.material.viscosity),
       adaptive_(!scene.time.step),
       comm_(comm),
-      engine_(make_empty_engine(scene, effects, threads, comm)),
+      engine_(make_empty_engine(scene, effects, threads, comm, make)),
       window_(scene.gravity.interval),
       time_(state.time),
       dt_(state.dt),

@@ -20,11 +20,12 @@ class TimeLoop {
   using Visit = std::function<bool(const TimeLoop&)>;
 
   /// Makes the engine with its particles, evaluates gravity, sets v^{-1/2} and scatters for the first time. Collective.
-  TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm);
+  TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm,
+           grid::EngineMaker make = &grid::make_host_engine);
 
   /// Goes on from a state that engine().save() and state() gave, without anything being computed anew. Collective.
   TimeLoop(const Scene& scene, const ResolvedEffects& effects, const EngineState& engine, const LoopState& state,
-           int threads, const mpi::Comm& comm);
+           int threads, const mpi::Comm& comm, grid::EngineMaker make = &grid::make_host_engine);
 
   /// Steps until `at_time_step` returns false; it is called at every t_n, when the grid holds v^{n-1/2} and v^{n+1/2}
   /// and observe() is meaningful. Collective.

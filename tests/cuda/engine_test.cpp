@@ -198,6 +198,21 @@ TEST_P(CudaEngineTest, CollisionEqualsHostEngine) {
   EXPECT_GT(*std::max_element(particles.damage.begin(), particles.damage.end()), 0.5) << "damage is to be at work";
 }
 
+// More particles in a tile than a thread block has threads.
+TEST_P(CudaEngineTest, FullTilesEqualHostEngine) {
+  Scene scene = small_impact(GetParam());
+  scene.cell *= 3.0;
+  const double block = 4 * scene.cell;
+  for (BodyParameters& body : scene.bodies) body.position += 0.5 * Vec3d{block, block, block};
+  const Pair pair(scene, kRock, 40);
+  expect_below(pair.difference(), GetParam());
+  const ParticleOutput particles = pair.host->observe();
+  const auto in_first_block = [&](const Vec3d& x) {
+    return std::min({x.x, x.y, x.z}) > 0 && std::max({x.x, x.y, x.z}) < block - scene.cell;
+  };
+  EXPECT_GT(std::count_if(particles.position.begin(), particles.position.end(), in_first_block), kPassThreads);
+}
+
 TEST_P(CudaEngineTest, WorkAndCountsEqualHostEngine) {
   const Pair pair(small_impact(GetParam()), kRock, 58);
   const double tolerance = GetParam() == Precision::kDouble ? kDouble : kMixed;
@@ -315,6 +330,23 @@ TEST_P(CudaEngineTest, GravityTimeStepAndDamageEndEqualHostEngine) {
   const std::vector<double> ratios[2] = {device->volume_ratios(), host->volume_ratios()};
   EXPECT_NEAR(*std::min_element(ratios[0].begin(), ratios[0].end()),
               *std::min_element(ratios[1].begin(), ratios[1].end()), tolerance);
+}
+
+// A graph of a step holds its dt.
+TEST_P(CudaEngineTest, StepMayChange) {
+  const Scene scene = debris(GetParam());
+  const auto host = grid::make_host_engine(setup_for(scene), self());
+  const auto device = make_cuda_engine(setup_for(scene));
+  for (Engine* engine : {host.get(), device.get()}) {
+    fill(*engine, scene);
+    engine->scatter(0.5 * kStep);
+    engine->update_grid(kStep);
+    for (const double step : {kStep, kStep, 0.5 * kStep, 0.5 * kStep, kStep, kStep}) {
+      engine->gather_scatter(step);
+      engine->update_grid(step);
+    }
+  }
+  expect_below(compare(device->observe(), host->observe()), GetParam());
 }
 
 TEST_P(CudaEngineTest, DamageEndsWhenAllIsBroken) {

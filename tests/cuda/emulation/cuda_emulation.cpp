@@ -85,7 +85,11 @@ class Machine {
   static unsigned count(dim3 size) { return size.x * size.y * size.z; }
   [[nodiscard]] std::vector<unsigned> permutation(unsigned n);
   void run_block(unsigned number);
+  void forget_lanes() {
+    for (const auto& lane : lane_) lane->fiber.forget();
+  }
   bool run_lanes();
+  unsigned random_warp();
   bool complete_barrier();
   bool complete_collectives();
   bool complete_collective(unsigned warp, unsigned first);
@@ -99,6 +103,7 @@ class Machine {
   unsigned lanes_ = 0;
   unsigned block_number_ = 0;
   unsigned current_ = 0;
+  unsigned favourite_ = 0;  // warp
   bool running_ = false;
   std::vector<unsigned> lane_order_;
   std::vector<std::unique_ptr<Lane>> lane_;
@@ -139,12 +144,19 @@ void Machine::run(const char* kernel, dim3 grid, dim3 block, std::size_t shared_
     bool& running;
     ~Stop() { running = false; }
   } stop{running_};
+  constexpr std::size_t most_starts = 6000;
+  std::size_t starts = 0;
   for (const unsigned b : permutation(count(grid))) {
+    if ((starts += lanes_) > most_starts) {
+      forget_lanes();
+      starts = lanes_;
+    }
     shared_.renew(shared_bytes);
     run_block(b);
     if (!shared_.intact()) fail(0, "wrote beyond its shared memory of " + std::to_string(shared_bytes) + " bytes");
   }
   ordering_.launch_ends();
+  forget_lanes();
 }
 
 void Machine::run_block(unsigned number) {
@@ -164,14 +176,26 @@ void Machine::run_block(unsigned number) {
   }
 }
 
+// One warp that can go on. Mostly the same again, so that it gets far ahead of the others where no barrier holds it.
+unsigned Machine::random_warp() {
+  const unsigned warps = (lanes_ + kWarp - 1) / kWarp;
+  const auto can_go = [&](unsigned warp) {
+    const auto first = lane_.begin() + warp * kWarp;
+    const auto last = lane_.begin() + std::min(lanes_, (warp + 1) * kWarp);
+    return std::any_of(first, last, [](const auto& l) { return l->state == State::kRunnable; });
+  };
+  if (random() % 16 == 0 || favourite_ >= warps) favourite_ = static_cast<unsigned>(random() % warps);
+  for (unsigned n = 0; n < warps && !can_go(favourite_); ++n) favourite_ = (favourite_ + 1) % warps;
+  return favourite_;
+}
+
 bool Machine::run_lanes() {
   bool ran = false;
-  // Another lane begins each time.
-  const unsigned shift = order == Order::kRandom ? static_cast<unsigned>(random() % lanes_) : 0U;
+  const unsigned warp = order == Order::kRandom ? random_warp() : 0U;
   for (unsigned n = 0; n < lanes_; ++n) {
-    current_ = lane_order_[(n + shift) % lanes_];
+    current_ = lane_order_[n];
     Lane& lane = *lane_[current_];
-    if (lane.state != State::kRunnable) continue;
+    if (lane.state != State::kRunnable || (order == Order::kRandom && current_ / kWarp != warp)) continue;
     lane.fiber.enter();
     if (!mistake_.empty()) throw EmulationError(std::exchange(mistake_, {}));
     ran = true;
@@ -203,11 +227,15 @@ unsigned Machine::wait_for_block(unsigned value, int line) {
 }
 
 bool Machine::complete_barrier() {
+  const auto last = lane_.begin() + lanes_;
+  const auto on_the_way = [](const auto& l) {
+    return l->state == State::kRunnable || l->state == State::kInCollective;
+  };
+  if (std::any_of(lane_.begin(), last, on_the_way)) return false;
   const Lane& first = *lane_[0];
   std::uint64_t sum = 0;
   for (unsigned l = 0; l < lanes_; ++l) {
     const Lane& lane = *lane_[l];
-    if (lane.state == State::kRunnable || lane.state == State::kInCollective) return false;
     if (lane.state == State::kAtBarrier && first.state == State::kDone)
       fail(0, "left before the barrier of line " + std::to_string(lane.line));
     if (lane.state == State::kDone) fail(l, "left before the barrier of line " + std::to_string(first.line));

@@ -23,7 +23,8 @@ class EmulationError : public std::runtime_error {
   using std::runtime_error::runtime_error;
 };
 
-/// In which order lanes of a block, and blocks, run between two barriers.
+/// In which order lanes of a block, and blocks, run between two barriers. Random: one warp at a time runs ahead of the
+/// others, lanes and blocks are shuffled.
 enum class Order { kForward, kReverse, kRandom };
 void set_order(Order order, std::uint64_t seed = 1);
 

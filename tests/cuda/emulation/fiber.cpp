@@ -46,6 +46,13 @@ Fiber::Fiber()
 
 Fiber::~Fiber() { munmap(stack_, kStackBytes); }
 
+void Fiber::forget() {
+#if defined(BRECCIA_EMULATION_TSAN)
+  for (void* thread : threads_) __tsan_destroy_fiber(thread);
+  threads_.clear();
+#endif
+}
+
 void Fiber::start(void (*entry)()) {
 #if defined(__SANITIZE_ADDRESS__)
   __asan_unpoison_memory_region(stack_, kStackBytes);  // frames of a kernel that was given up
@@ -53,7 +60,7 @@ void Fiber::start(void (*entry)()) {
 #if defined(BRECCIA_EMULATION_TSAN)
   // A fresh history, and a stack whose addresses have none. The old one must live on: races with what a destroyed fiber
   // did are not reported.
-  thread_ = __tsan_create_fiber(0);
+  threads_.push_back(__tsan_create_fiber(0));
   munmap(stack_, kStackBytes);
   stack_ = static_cast<std::byte*>(
       mmap(nullptr, kStackBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0));
@@ -73,7 +80,7 @@ void Fiber::enter() {
 #endif
 #if defined(BRECCIA_EMULATION_TSAN)
   scheduler_thread_ = __tsan_get_current_fiber();
-  __tsan_switch_to_fiber(thread_, 0);
+  __tsan_switch_to_fiber(threads_.back(), 0);
 #endif
   breccia_switch_stack(&scheduler_pointer_, stack_pointer_);
 #if defined(__SANITIZE_ADDRESS__)

@@ -3,6 +3,7 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <vector>
 
 namespace breccia::cuda_emulation {
 
@@ -23,9 +24,16 @@ class Fiber {
   void leave(bool finished);
   /// Must be the first call inside `entry`.
   void arrived();
+  /// Forgets what the thread sanitizer knows of earlier starts, which bears on races with them. It has not room for
+  /// all.
+  void forget();
 
  private:
+#if defined(BRECCIA_EMULATION_TSAN)
+  static constexpr std::size_t kStackBytes = std::size_t{32} << 10;  // mapped anew at each start
+#else
   static constexpr std::size_t kStackBytes = std::size_t{256} << 10;
+#endif
 
   std::byte* stack_;
   void* stack_pointer_ = nullptr;
@@ -34,7 +42,7 @@ class Fiber {
   void* scheduler_fake_stack_ = nullptr;  // address sanitizer
   const void* scheduler_stack_ = nullptr;
   std::size_t scheduler_stack_bytes_ = 0;
-  void* thread_ = nullptr;            // thread sanitizer
+  std::vector<void*> threads_;        // thread sanitizer: this start's last
   void* scheduler_thread_ = nullptr;  // thread sanitizer
 };
 
