@@ -15,30 +15,37 @@ namespace breccia::cuda {
 
 inline constexpr int kStencil = 3;
 inline constexpr int kStencilNodes = 27;
-/// Nodes from one plane of the tile in shared memory to the next: three more than it holds, so that the 27 nodes of a
-/// stencil lie in almost as many banks.
-inline constexpr int kPlane = grid::kTileWidth * grid::kTileWidth + 3;
-inline constexpr int kSharedNodes = grid::kTileWidth * kPlane;
+/// Velocities in shared memory: threads read nodes of their own, mostly those of neighbours.
+inline constexpr int kReadNodes = kTileNodes;
+BRECCIA_HD int read_node(int x, int y, int z) { return (x * grid::kTileWidth + y) * grid::kTileWidth + z; }
+/// Sums in shared memory: lanes add to the 27 nodes of one stencil, which lie in as many of the 32 banks.
+inline constexpr int kSumRow = grid::kTileWidth + 1;
+inline constexpr int kSumPlane = 99;
+inline constexpr int kSumNodes = grid::kTileWidth * kSumPlane;
+static_assert(kSumPlane >= grid::kTileWidth * kSumRow && kSumPlane % 32 == 3 && kSumRow % 32 == 9);
+BRECCIA_HD int sum_node(int x, int y, int z) { return x * kSumPlane + y * kSumRow + z; }
 
-BRECCIA_HD int shared_node(int x, int y, int z) { return x * kPlane + y * grid::kTileWidth + z; }
-
-/// What a particle gives to its 27 nodes: node (r) gets w (value + slope . r), r in cells from the nearest node.
+/// What a particle gives to its 27 nodes: node (r) gets w (value + slope . r), r in cells from the nearest node. All
+/// members are read at once by all lanes, 16 bytes at a time.
 template <class Real>
-struct alignas(16) Spread {
-  struct alignas(4 * sizeof(Real) < 16 ? 4 * sizeof(Real) : 16) Linear {
+struct Spread {
+  struct alignas(16) Linear {
     Real value, x, y, z;
   };
+  struct alignas(16) Place {
+    Real offset[3];  ///< from the nearest node [cells]
+    int start;       ///< first node; negative: nothing to give
+  };
   Linear channel[3][2];  ///< [axis] momentum, force
-  Real weight[3][kStencil];
-  Real mass;
-  int start;  ///< first node; negative: nothing to give
+  Place place;
 };
 
 template <class Real>
 struct TileShared {
-  Real velocities[kVelocities][kSharedNodes];
-  Real sums[kSums][kSharedNodes];
   Spread<Real> spread[kPassThreads];
+  Real mass[kPassThreads];
+  Real velocities[kVelocities][kReadNodes];
+  Real sums[kSums][kSumNodes];
   ThreadWork work[kPassThreads];
   unsigned touched;  ///< 8 bits an axis: first nodes of the stencils
 };
@@ -67,7 +74,7 @@ struct Stencil {
     return static_cast<unsigned>(start[0]) <= last && static_cast<unsigned>(start[1]) <= last &&
            static_cast<unsigned>(start[2]) <= last;
   }
-  [[nodiscard]] BRECCIA_HD int node() const { return shared_node(start[0], start[1], start[2]); }
+  [[nodiscard]] BRECCIA_HD int node() const { return read_node(start[0], start[1], start[2]); }
 };
 
 /// sum w n over the nodes, and sum w r n about the particle.
@@ -82,7 +89,7 @@ BRECCIA_HD Moments<Real> gather(const Real* nodes, const Stencil<Real>& s) {
   for (int i = 0; i < kStencil; ++i) {
     Real value = 0, y = 0, z = 0;
     for (int j = 0; j < kStencil; ++j) {
-      const Real* line = nodes + shared_node(i, j, 0);
+      const Real* line = nodes + read_node(i, j, 0);
       const Real below = s.weight[2][0] * line[0];
       const Real above = s.weight[2][2] * line[2];
       const Real sum = (below + above) + s.weight[2][1] * line[1];
@@ -108,8 +115,8 @@ class TileGrid {
  public:
   static constexpr bool kKeepsGradient = false;
 
-  BRECCIA_HD TileGrid(const PassArguments<Real>& a, TileShared<Real>& shared, Spread<Real>& spread)
-      : a_(a), shared_(shared), spread_(spread) {}
+  BRECCIA_HD TileGrid(const PassArguments<Real>& a, TileShared<Real>& shared, int thread)
+      : a_(a), shared_(shared), spread_(shared.spread[thread]), mass_(shared.mass[thread]) {}
 
   BRECCIA_HD GridVelocity<Real> velocity(unsigned, const Motion<Real>& motion) const {
     const Stencil<Real> s(motion);
@@ -129,12 +136,10 @@ class TileGrid {
   BRECCIA_HD void scatter(unsigned slot, const Motion<Real>& motion, const ParticleStress<Real>& p) {
     const Stencil<Real> s(motion);
     inside_ = s.inside();
-    spread_.start = inside_ ? s.node() : -1;
+    spread_.place = {{s.offset[0], s.offset[1], s.offset[2]},
+                     inside_ ? sum_node(s.start[0], s.start[1], s.start[2]) : -1};
     touched_ = inside_ ? 1U << s.start[0] | 1U << (s.start[1] + 8) | 1U << (s.start[2] + 16) : 0U;
-    for (int axis = 0; axis < 3; ++axis) {
-      for (int n = 0; n < kStencil; ++n) spread_.weight[axis][n] = s.weight[axis][n];
-    }
-    spread_.mass = motion.mass;
+    mass_ = motion.mass;
     const Real affine = a_.transfer.affine ? motion.mass * a_.cell : Real(0);
     const Real pull = Real(-4) / a_.cell * p.volume;
     const Vec3<Real> g = gravity_of(a_, slot);
@@ -159,6 +164,7 @@ class TileGrid {
   const PassArguments<Real>& a_;
   TileShared<Real>& shared_;
   Spread<Real>& spread_;
+  Real& mass_;
   bool inside_ = true;
   unsigned touched_ = 0;
 };
@@ -180,29 +186,37 @@ BRECCIA_HD void load_tile(const PassArguments<Real>& a, unsigned tile, int threa
     const Real* from = a.grid.velocities + std::size_t{block} * kSums * grid::kBlockNodes + place;
     for (int c = 0; c < kVelocities; ++c) {
       // No particle reaches a node of a block that does not exist.
-      shared.velocities[c][shared_node(at.x, at.y, at.z)] =
+      shared.velocities[c][read_node(at.x, at.y, at.z)] =
           block == grid::kNoBlock ? Real(0) : from[c * grid::kBlockNodes];
     }
   }
 }
 
+/// Weight along one axis of the node that is `step` (-1, 0, 1) cells from the nearest one.
+template <class Real>
+BRECCIA_HD Real weight_of(int step, Real d) {
+  const Real reach = Real(0.5) + static_cast<Real>(step) * d;
+  return step == 0 ? Real(0.75) - d * d : Real(0.5) * reach * reach;
+}
+
 /// Adds what `count` particles have spread: warp `axis` momentum and force along it, warp 3 the mass.
 template <class Real>
 __device__ __forceinline__ void add_spread(TileShared<Real>& shared, int count, int warp, int lane) {
-  const int i = lane / 9, j = lane / 3 % 3, k = lane % 3;
-  const int node = shared_node(i, j, k);
-  const Real x = static_cast<Real>(i - 1), y = static_cast<Real>(j - 1), z = static_cast<Real>(k - 1);
+  const int i = lane / 9 - 1, j = lane / 3 % 3 - 1, k = lane % 3 - 1;
+  const int node = sum_node(i + 1, j + 1, k + 1);
+  const Real x = static_cast<Real>(i), y = static_cast<Real>(j), z = static_cast<Real>(k);
   for (int n = 0; n < count; ++n) {
-    const Spread<Real>& s = shared.spread[n];
-    if (lane < kStencilNodes && s.start >= 0) {
-      const Real weight = s.weight[0][i] * s.weight[1][j] * s.weight[2][k];
-      const int at = s.start + node;
+    const typename Spread<Real>::Place place = shared.spread[n].place;
+    if (lane < kStencilNodes && place.start >= 0) {
+      const Real weight = weight_of(i, place.offset[0]) * weight_of(j, place.offset[1]) * weight_of(k, place.offset[2]);
+      const int at = place.start + node;
       if (warp < 3) {
-        const typename Spread<Real>::Linear p = s.channel[warp][0], f = s.channel[warp][1];
+        const typename Spread<Real>::Linear p = shared.spread[n].channel[warp][0];
+        const typename Spread<Real>::Linear f = shared.spread[n].channel[warp][1];
         shared.sums[kMomentum + warp][at] += weight * (p.value + p.x * x + p.y * y + p.z * z);
         shared.sums[kForce + warp][at] += weight * (f.value + f.x * x + f.y * y + f.z * z);
       } else {
-        shared.sums[kMass][at] += weight * s.mass;
+        shared.sums[kMass][at] += weight * shared.mass[n];
       }
     }
     __syncwarp();  // the next particle shares nodes with this one, on other lanes
@@ -229,7 +243,7 @@ __device__ __forceinline__ void store_tile(const PassArguments<Real>& a, unsigne
   for (int n = thread; n < kTileNodes; n += kPassThreads) {
     const NodePosition at = node_position<grid::kTileWidth>(n);
     if (!box_holds(box, at.x, 0) || !box_holds(box, at.y, 1) || !box_holds(box, at.z, 2)) continue;
-    const int node = shared_node(at.x, at.y, at.z);
+    const int node = sum_node(at.x, at.y, at.z);
     for (int c = 0; c < kSums; ++c) to[c * kTileNodes + n] = shared.sums[c][node];
     // Mass in a block that no particle could reach at the last sorting: one has drifted more than the margin allows.
     if (block_of(a.grid, tile, at) == grid::kNoBlock && shared.sums[kMass][node] != Real(0)) atomicAdd(a.strayed, 1U);
@@ -246,7 +260,7 @@ __global__ void __launch_bounds__(kPassThreads, kPassBlocks<Real>) tile_pass(Pas
 
   if (a.gather) load_tile(a, tile, thread, shared);
   if (a.scatter) {
-    for (int n = thread; n < kSums * kSharedNodes; n += kPassThreads) (&shared.sums[0][0])[n] = Real(0);
+    for (int n = thread; n < kSums * kSumNodes; n += kPassThreads) (&shared.sums[0][0])[n] = Real(0);
   }
   shared.work[thread] = {};
   if (thread == 0) shared.touched = 0;
@@ -256,7 +270,7 @@ __global__ void __launch_bounds__(kPassThreads, kPassBlocks<Real>) tile_pass(Pas
     const int left = particles - done;
     unsigned touched = 0;
     if (thread < left) {
-      TileGrid<Real> grid(a, shared, shared.spread[thread]);
+      TileGrid<Real> grid(a, shared, thread);
       shared.work[thread].add(pass_over_particle(a, first + static_cast<unsigned>(done + thread), grid));
       touched = grid.touched();
       if (!grid.inside()) atomicAdd(a.strayed, 1U);
