@@ -7,6 +7,9 @@
 namespace breccia::cuda {
 namespace {
 
+constexpr int kCellBits = 6;  // of a cell in its block
+static_assert(grid::kBlockNodes == 1 << kCellBits);
+
 // One number that the host needs to go on.
 unsigned number_at(const unsigned* address, cudaStream_t stream) {
   unsigned value = 0;
@@ -22,7 +25,7 @@ CompactKeys compact_layout(const PlaceReport& report) {
     const int high = report.highest[axis] - grid::kBlockLimit;
     const int low = grid::kBlockLimit - report.lowest[axis];
     *corner[axis] = low;
-    keys.bits[axis] = std::bit_width(static_cast<unsigned>(high - low));
+    keys.bits[axis] = static_cast<int>(std::bit_width(static_cast<unsigned>(high - low)));
   }
   return keys;
 }
@@ -49,7 +52,7 @@ void DeviceGrid<P>::sort(DeviceParticles<P>& particles, cudaStream_t stream) {
   sort_keys_.reserve(count);
   order_.reserve(count);
   const CompactKeys layout = place(particles, stream);
-  radix_sort(sort_keys_, order_, count, 0, std::bit_width(unsigned{grid::kBlockNodes - 1}), scratch_, stream);
+  radix_sort(sort_keys_, order_, count, 0, kCellBits, scratch_, stream);
   launch_compact_keys(key_of_particle_.data(), order_.data(), sort_keys_.data(), count, layout, stream);
   radix_sort(sort_keys_, order_, count, 0, layout.all_bits(), scratch_, stream);
   find_runs(count, stream);

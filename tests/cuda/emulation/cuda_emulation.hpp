@@ -74,10 +74,11 @@ unsigned lane_of_warp();
 #define BRECCIA_LAUNCH(kernel, grid, block, shared_bytes, stream, ...) \
   breccia::cuda_emulation::launch_with(                                \
       #kernel, grid, block, shared_bytes, stream, [](auto... arguments) { kernel(arguments...); }, __VA_ARGS__)
+// NOLINTNEXTLINE(bugprone-macro-parentheses): a type
 #define BRECCIA_SHARED(Type, name) Type& name = *static_cast<Type*>(breccia::cuda_emulation::shared_memory())
 
 // The names are CUDA's.
-// NOLINTBEGIN(bugprone-reserved-identifier)
+// NOLINTBEGIN(bugprone-reserved-identifier, readability-identifier-naming)
 #define __global__
 #define __device__
 #define __host__
@@ -121,7 +122,6 @@ T __shfl_down_sync(unsigned mask, T value, unsigned delta, int line = __builtin_
 inline int __popc(unsigned x) { return __builtin_popcount(x); }
 inline int __ffs(int x) { return __builtin_ffs(x); }
 inline int __clz(int x) { return x == 0 ? 32 : __builtin_clz(static_cast<unsigned>(x)); }
-// NOLINTEND(bugprone-reserved-identifier)
 
 template <class T>
 T atomicAdd(T* address, T value) {
@@ -143,3 +143,4 @@ T atomicCAS(T* address, T expected, T value) {
   __atomic_compare_exchange_n(address, &expected, value, false, __ATOMIC_RELAXED, __ATOMIC_RELAXED);
   return expected;
 }
+// NOLINTEND(bugprone-reserved-identifier, readability-identifier-naming)
