@@ -46,6 +46,7 @@ class PackPass {
     Kinematics<P> k = a_.kinematics[i];
     auto state = load_state(a_, fx_, i);
     PackStress<P> out;
+    out.tau = {};
     material::Dissipation<T> lost{};
     Real moved(0);
     if (a_.gather) {
@@ -68,7 +69,6 @@ class PackPass {
     }
     if (a_.scatter) {
       if (fx_.damage) prefetch(a_.flaws + i + 1);
-      out.tau = {};
       for_each_material(i, state, [&](const material::Constants<Real>& c, material::State<T>& s) BRECCIA_INLINE_LAMBDA {
         stress(c, s, out.gradient, i, lost, out.tau);
       });
