@@ -54,6 +54,7 @@ class TimeLoop {
   void make_solver(const ResolvedEffects& effects, int threads);
   void count_step();
   void between_steps();
+  void check();  // of the guard
   void begin_window();
   void evaluate_gravity();
   [[nodiscard]] bool sorting_due() const { return steps_since_sort_ + 1 >= sort_interval_; }
