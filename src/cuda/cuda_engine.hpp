@@ -1,5 +1,6 @@
 // The MPM engine on one CUDA device: particles and grid stay there from the first step to the last. A step is three
-// launches at most, captured in a graph; the host waits at sortings and where it looks at results.
+// launches at most, captured in a graph; the host waits at sortings, where it looks at results, and on several ranks
+// for the halo.
 #pragma once
 
 #include <memory>
@@ -8,6 +9,7 @@
 #include "cuda/device_array.hpp"
 #include "cuda/device_grid.hpp"
 #include "cuda/device_particles.hpp"
+#include "cuda/halo.hpp"
 #include "cuda/launchers.hpp"
 #include "cuda/step_graph.hpp"
 #include "grid/boundary.hpp"
@@ -20,7 +22,7 @@ class CudaEngine final : public grid::Engine {
  public:
   using Real = typename P::Real;
 
-  /// On the current device. Throws UsageError for more than one rank.
+  /// On the current device.
   CudaEngine(const grid::EngineSetup& setup, const mpi::Comm& comm);
 
   void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
@@ -51,6 +53,14 @@ class CudaEngine final : public grid::Engine {
   [[nodiscard]] NodeArguments<Real> node_arguments(double kick) const;
   void launch_pass(const PassArguments<Real>& arguments);
   void settle();
+  // On several ranks (cuda_engine_ranks.cpp).
+  [[nodiscard]] OwnPlanes own_planes() const;
+  void migrate();
+  void take(std::span<const unsigned> staying, std::vector<grid::BlockKey> keys,
+            const std::vector<std::vector<std::byte>>& messages);
+  [[nodiscard]] std::vector<std::vector<std::byte>> messages_of(const std::vector<std::vector<unsigned>>& leaving,
+                                                                std::span<const grid::BlockKey> keys);
+  void cut_anew();
   void restore_flaws(const EngineState& state);
   void save_flaws(EngineState& state) const;
   void switch_damage_off();
@@ -68,6 +78,7 @@ class CudaEngine final : public grid::Engine {
   DeviceArray<material::Constants<double>> double_constants_;
   DeviceArray<BoundaryPlane> walls_;
   DeviceArray<float> flaw_thresholds_;
+  std::vector<float> flaw_thresholds_host_;  // the same: they never change, and go with particles to other ranks
   DeviceArray<PassSums> pass_sums_;
   DeviceArray<unsigned> strayed_;
   Transfer<Real> transfer_{};
@@ -75,6 +86,8 @@ class CudaEngine final : public grid::Engine {
   double kick_ = 0.0;           // of the last grid update [s]
   bool grid_is_ahead_ = false;  // the last graph has updated the grid already
   StepGraph graph_;
+  mpi::Slabs slabs_;
+  Halo<Real> halo_;
 };
 
 extern template class CudaEngine<MixedPrecision>;

@@ -38,6 +38,8 @@ EngineState CudaEngine<P>::save() const {
   if (particles_.groups().flaws) save_flaws(state);
   state.damage_finished = setup_.effects.fully_damaged;
   state.smallest_mass = smallest_mass_;
+  state.slab_axis = slabs_.axis();
+  state.slab_cuts = slabs_.cuts();
   return state;
 }
 
@@ -45,7 +47,6 @@ template <class P>
 void CudaEngine<P>::save_flaws(EngineState& state) const {
   const auto first = particles_.template download_component<std::int32_t>("flaw_first", 0, stream_);
   const auto count = particles_.template download_component<std::int32_t>("flaw_count", 0, stream_);
-  const std::vector<float> thresholds = flaw_thresholds_.download(flaw_thresholds_.size(), stream_);
   StateColumn active{grid::kActiveFlaws, "", "flaws that grow", 4, 1, {}};
   for (std::size_t i = 0; i < count.size(); ++i) {
     const auto growing = static_cast<std::uint32_t>(count[i] & 0xffff);
@@ -53,7 +54,7 @@ void CudaEngine<P>::save_flaws(EngineState& state) const {
     active.values.insert(active.values.end(), bytes, bytes + sizeof growing);
     const std::int32_t all = count[i] >> 16;
     state.flaw_count.push_back(static_cast<std::uint32_t>(all));
-    const auto own = thresholds.begin() + first[i];
+    const auto own = flaw_thresholds_host_.begin() + first[i];
     state.flaw_thresholds.insert(state.flaw_thresholds.end(), own, own + all);
   }
   state.columns.push_back(std::move(active));
@@ -61,6 +62,14 @@ void CudaEngine<P>::save_flaws(EngineState& state) const {
 
 template <class P>
 void CudaEngine<P>::restore(const EngineState& state) {
+  if (!state.same_ranks) {
+    // The host engine knows how to cut slabs and share out particles.
+    const auto host = grid::make_host_engine(setup_, comm_);
+    host->restore(state);
+    restore(host->save());
+    return;
+  }
+  slabs_ = mpi::Slabs(state.slab_axis, state.slab_cuts);
   if (state.damage_finished && setup_.effects.damage) switch_damage_off();
   particles_.allocate(state.particles);
   std::vector<grid::BlockKey> keys(state.particles);
@@ -99,8 +108,9 @@ void CudaEngine<P>::restore_flaws(const EngineState& state) {
   }
   particles_.upload(*particles_.find("flaw_first"), reinterpret_cast<const std::byte*>(first.data()), stream_);
   particles_.upload(*particles_.find("flaw_count"), reinterpret_cast<const std::byte*>(count.data()), stream_);
-  flaw_thresholds_.allocate(state.flaw_thresholds.size());
-  flaw_thresholds_.upload(state.flaw_thresholds, stream_);
+  flaw_thresholds_host_ = state.flaw_thresholds;
+  flaw_thresholds_.reserve(flaw_thresholds_host_.size());
+  flaw_thresholds_.upload(flaw_thresholds_host_, stream_);
 }
 
 template class CudaEngine<MixedPrecision>;

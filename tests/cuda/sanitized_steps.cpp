@@ -1,5 +1,5 @@
-// A few steps of a small scene, a sorting included, through the engine on the emulated device: built with a sanitizer, as
-// racecheck (every lane is a thread to it) or memcheck of every kernel of the step. An argument makes it brief.
+// A few steps of a small scene, a sorting included, through the engine on the emulated device: built with a sanitizer,
+// as racecheck (every lane is a thread to it) or memcheck of every kernel of the step. An argument makes it brief.
 #include <cstdio>
 #include <vector>
 
