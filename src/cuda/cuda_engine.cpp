@@ -26,7 +26,6 @@ CudaEngine<P>::CudaEngine(const grid::EngineSetup& setup, const mpi::Comm& comm)
       // Walls act on nodes: a particle needs them near one.
       grid_(boundaries_.periodicity(), setup.numerics.lone_without_grid && !boundaries_.has_walls()),
       transfer_(transfer_of<Real>(setup.numerics)) {
-  if (comm.size() != 1) throw UsageError("the CUDA engine runs on one rank for now: use --device host");
   std::vector<material::Constants<Real>> constants;
   std::vector<material::Constants<double>> double_constants;
   for (const MaterialParameters& material : setup.materials) {
@@ -73,6 +72,7 @@ PassArguments<typename P::Real> CudaEngine<P>::pass_arguments(double step, doubl
 template <class P>
 NodeArguments<typename P::Real> CudaEngine<P>::node_arguments(double kick) const {
   return {.grid = grid_.view(),
+          .shared = halo_.view(),
           .kick = static_cast<Real>(kick),
           .smallest_mass = static_cast<Real>(1e-30 * smallest_mass_),
           .cell = setup_.cell,
@@ -102,8 +102,9 @@ void CudaEngine<P>::gather(double step) {
 
 template <class P>
 void CudaEngine<P>::gather_scatter(double step) {
-  // The step's kick is that of the update before: a change of dt is seen by the capture of the step after.
-  if (kick_ != step) {
+  // The step's kick is that of the update before: a change of dt is seen by the capture of the step after. A halo
+  // cannot be part of a graph.
+  if (kick_ != step || comm_.size() > 1) {
     launch_pass(pass_arguments(step, 0.5 * step));
     return;
   }
@@ -117,16 +118,19 @@ void CudaEngine<P>::gather_scatter(double step) {
 template <class P>
 void CudaEngine<P>::update_grid(double kick) {
   kick_ = kick;
-  if (!std::exchange(grid_is_ahead_, false)) launch_node_update(node_arguments(kick), stream_);
+  if (std::exchange(grid_is_ahead_, false)) return;
+  halo_.exchange(grid_.view(), comm_, stream_);
+  launch_node_update(node_arguments(kick), stream_);
 }
 
 template <class P>
 void CudaEngine<P>::sort() {
-  if (strayed()) {
+  if (comm_.any(strayed())) {
     throw NumericsError(
         "particles moved more than a cell between two sortings, or are not finite: the run is unstable (try a smaller "
         "time.step), or numerics.sort_interval is too long for its speeds");
   }
+  migrate();
   settle();
 }
 
@@ -140,7 +144,8 @@ template <class P>
 void CudaEngine<P>::settle() {
   graph_.clear();
   counts_.fill_bytes(0, stream_);
-  grid_.sort(particles_, stream_);
+  grid_.sort(particles_, own_planes(), stream_);
+  if (comm_.size() > 1) halo_.set(grid_.block_keys(stream_), boundaries_.periodicity(), slabs_, comm_, stream_);
   pass_sums_.reserve(grid_.pass_blocks());
   pass_sums_.fill_bytes(0, stream_);
 }
@@ -150,14 +155,15 @@ grid::PassReport CudaEngine<P>::passes() const {
   DeviceArray<PassSums> total(1);
   launch_total(pass_sums_.data(), grid_.pass_blocks(), total.data(), stream_);
   const PassSums sums = total.download(1, stream_)[0];
-  grid::PassReport report{.plastic_work = sums.plastic_work,
-                          .viscous_work = sums.viscous_work,
-                          .largest_move = sums.largest_move,
-                          .clamped = counts_.download(2, stream_)[1]};
+  grid::PassReport report;
+  report.plastic_work = sums.plastic_work;
+  report.viscous_work = sums.viscous_work;
+  report.largest_move = sums.largest_move;
+  report.clamped = counts_.download(2, stream_)[1];
   if (sums.largest_move >= 1.0) {
     // The device keeps no state from before the step.
     const grid::ParticleSample worst = fastest().value();
-    report.fault = grid::ParticleFault{worst, worst.values, sums.largest_move < static_cast<double>(kNotFinite<Real>)};
+    report.fault = grid::ParticleFault{worst, worst.values, sums.largest_move < 0.5 * kNotFinite};
   }
   return report;
 }
@@ -195,6 +201,7 @@ void CudaEngine<P>::switch_damage_off() {
   setup_.effects.fully_damaged = true;
   particles_.drop_damage();
   flaw_thresholds_ = {};
+  flaw_thresholds_host_ = {};
 }
 
 template class CudaEngine<MixedPrecision>;

@@ -1,5 +1,6 @@
 // The MPM engine on one CUDA device: particles and grid stay there from the first step to the last. A step is three
-// launches at most, captured in a graph; the host waits at sortings and where it looks at results.
+// launches at most, captured in a graph; the host waits at sortings, where it looks at results, and on several ranks
+// for the halo.
 #pragma once
 
 #include <memory>
@@ -8,6 +9,7 @@
 #include "cuda/device_array.hpp"
 #include "cuda/device_grid.hpp"
 #include "cuda/device_particles.hpp"
+#include "cuda/halo.hpp"
 #include "cuda/launchers.hpp"
 #include "cuda/step_graph.hpp"
 #include "grid/boundary.hpp"
@@ -20,12 +22,13 @@ class CudaEngine final : public grid::Engine {
  public:
   using Real = typename P::Real;
 
-  /// On the current device. Throws UsageError for more than one rank.
+  /// On the current device.
   CudaEngine(const grid::EngineSetup& setup, const mpi::Comm& comm);
 
   void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
               std::span<const Vec3d> spin_of_body) override;
   [[nodiscard]] EngineState save() const override;
+  [[nodiscard]] material::FlawLists flaws() const override;
   void restore(const EngineState& state, const material::FlawLists& flaws) override;
   void sort() override;
   void scatter(double half_step) override;
@@ -57,6 +60,14 @@ class CudaEngine final : public grid::Engine {
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
   [[nodiscard]] ParticleOutput read_particles(const std::vector<Real>& new_velocity,
                                               const std::vector<Real>& node_mass) const;
+  // On several ranks (cuda_engine_ranks.cpp).
+  [[nodiscard]] OwnPlanes own_planes() const;
+  void migrate();
+  void take(std::span<const unsigned> staying, std::vector<grid::BlockKey> keys,
+            const std::vector<std::vector<std::byte>>& messages);
+  [[nodiscard]] std::vector<std::vector<std::byte>> messages_of(const std::vector<std::vector<unsigned>>& leaving,
+                                                                std::span<const grid::BlockKey> keys);
+  void cut_anew();
   void save_flaws(EngineState& state) const;
   void switch_damage_off();
   [[nodiscard]] std::vector<Vec3d> positions() const;
@@ -73,6 +84,7 @@ class CudaEngine final : public grid::Engine {
   DeviceArray<material::Constants<double>> double_constants_;
   DeviceArray<BoundaryPlane> walls_;
   DeviceArray<float> flaw_thresholds_;
+  std::vector<float> flaw_thresholds_host_;  // the same: they never change, and go with particles to other ranks
   DeviceArray<PassSums> pass_sums_;
   DeviceArray<unsigned> counts_;  // strayed particles; volume changes cut since the last sorting
   Transfer<Real> transfer_{};
@@ -80,6 +92,8 @@ class CudaEngine final : public grid::Engine {
   double kick_ = 0.0;           // of the last grid update [s]
   bool grid_is_ahead_ = false;  // the last graph has updated the grid already
   StepGraph graph_;
+  mpi::Slabs slabs_;
+  Halo<Real> halo_;
 };
 
 extern template class CudaEngine<MixedPrecision>;

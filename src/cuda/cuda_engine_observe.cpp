@@ -176,6 +176,7 @@ grid::EngineStats CudaEngine<P>::stats() const {
   stats.lone_particles = grid_.lone_particles();
   stats.tiles = grid_.tiles();
   stats.blocks = grid_.blocks();
+  stats.halo_bytes_per_step = halo_.bytes();
   stats.particle_bytes = particles_.bytes() + flaw_thresholds_.bytes();
   stats.grid_bytes = grid_.bytes();
   return stats;

@@ -1,7 +1,6 @@
 // Particles into the engine and the whole state out of it, in the form that no device determines.
 #include <algorithm>
 #include <cstring>
-#include <unordered_map>
 
 #include "breccia/error.hpp"
 #include "cuda/cuda_engine.hpp"
@@ -17,24 +16,6 @@ std::vector<std::int32_t> integers(const EngineState& state, const char* field) 
   return values;
 }
 
-// The rows of `flaws`, which are those of the ids, in the order of the state.
-material::FlawLists in_order_of(const EngineState& state, const std::vector<std::uint64_t>& ids,
-                                const material::FlawLists& flaws) {
-  std::unordered_map<std::uint64_t, std::size_t> row;
-  for (std::size_t i = 0; i < ids.size(); ++i) row.emplace(ids[i], i);
-  const std::vector<std::int32_t> low = integers(state, "id_low"), high = integers(state, "id_high");
-  material::FlawLists sorted;
-  sorted.first.push_back(0);
-  for (std::size_t i = 0; i < state.particles; ++i) {
-    const std::uint64_t id = static_cast<std::uint32_t>(low[i]) | std::uint64_t{static_cast<std::uint32_t>(high[i])}
-                                                                      << 32;
-    const std::span<const float> own = flaws.of(row.at(id));
-    sorted.threshold.insert(sorted.threshold.end(), own.begin(), own.end());
-    sorted.first.push_back(static_cast<std::uint32_t>(sorted.threshold.size()));
-  }
-  return sorted;
-}
-
 }  // namespace
 
 template <class P>
@@ -43,8 +24,7 @@ void CudaEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
   // The host engine knows how positions become nodes and offsets; once, at the start.
   const auto host = grid::make_host_engine(setup_, comm_);
   host->insert(particles, flaws, spin_of_body);
-  const EngineState state = host->save();
-  restore(state, in_order_of(state, particles.id, flaws));
+  restore(host->save(), host->flaws());
 }
 
 template <class P>
@@ -68,6 +48,8 @@ EngineState CudaEngine<P>::save() const {
   if (particles_.groups().flaws) save_flaws(state);
   state.damage_finished = setup_.effects.fully_damaged;
   state.smallest_mass = smallest_mass_;
+  state.slab_axis = slabs_.axis();
+  state.slab_cuts = slabs_.cuts();
   return state;
 }
 
@@ -84,7 +66,33 @@ void CudaEngine<P>::save_flaws(EngineState& state) const {
 }
 
 template <class P>
+material::FlawLists CudaEngine<P>::flaws() const {
+  material::FlawLists lists;
+  lists.first.assign(1, 0U);
+  if (!particles_.groups().flaws) {
+    lists.first.resize(particles_.count() + std::size_t{1}, 0U);
+    return lists;
+  }
+  const auto first = particles_.template download_component<std::int32_t>("flaw_first", 0, stream_);
+  const auto count = particles_.template download_component<std::int32_t>("flaw_count", 0, stream_);
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    const auto own = flaw_thresholds_host_.begin() + first[i];
+    lists.threshold.insert(lists.threshold.end(), own, own + (count[i] >> 16));
+    lists.first.push_back(static_cast<std::uint32_t>(lists.threshold.size()));
+  }
+  return lists;
+}
+
+template <class P>
 void CudaEngine<P>::restore(const EngineState& state, const material::FlawLists& flaws) {
+  if (!state.same_ranks) {
+    // The host engine knows how to cut slabs and share out particles.
+    const auto host = grid::make_host_engine(setup_, comm_);
+    host->restore(state, flaws);
+    restore(host->save(), host->flaws());
+    return;
+  }
+  slabs_ = mpi::Slabs(state.slab_axis, state.slab_cuts);
   if (state.damage_finished && setup_.effects.damage) switch_damage_off();
   particles_.allocate(state.particles);
   std::vector<grid::BlockKey> keys(state.particles);
@@ -127,8 +135,9 @@ void CudaEngine<P>::restore_flaws(const EngineState& state, const material::Flaw
   upload("flaw_first", first);
   upload("flaw_count", count);
   upload("next_threshold", next);
-  flaw_thresholds_.allocate(flaws.threshold.size());
-  flaw_thresholds_.upload(flaws.threshold, stream_);
+  flaw_thresholds_host_ = flaws.threshold;
+  flaw_thresholds_.reserve(flaw_thresholds_host_.size());
+  flaw_thresholds_.upload(flaw_thresholds_host_, stream_);
 }
 
 template class CudaEngine<MixedPrecision>;

@@ -87,4 +87,35 @@ class DeviceArray {
   std::size_t size_ = 0;
 };
 
+/// Memory of the host that the device copies to and from on its own.
+template <class T>
+class PinnedArray {
+ public:
+  PinnedArray() = default;
+  ~PinnedArray() { free(); }
+  PinnedArray(const PinnedArray&) = delete;
+  PinnedArray& operator=(const PinnedArray&) = delete;
+
+  [[nodiscard]] T* data() const { return data_; }
+  /// At least this long; what it held is lost if it grows.
+  void reserve(std::size_t size) {
+    if (size <= size_) return;
+    free();
+    void* memory = nullptr;
+    check(cudaMallocHost(&memory, size * sizeof(T)), "pinned memory");
+    data_ = static_cast<T*>(memory);
+    size_ = size;
+  }
+
+ private:
+  void free() noexcept {
+    if (data_ != nullptr) (void)cudaFreeHost(data_);
+    data_ = nullptr;
+    size_ = 0;
+  }
+
+  T* data_ = nullptr;
+  std::size_t size_ = 0;
+};
+
 }  // namespace breccia::cuda

@@ -44,19 +44,19 @@ std::vector<grid::BlockKey> DeviceGrid<P>::block_keys_of_particles(cudaStream_t 
 }
 
 template <class P>
-void DeviceGrid<P>::sort(DeviceParticles<P>& particles, cudaStream_t stream) {
+void DeviceGrid<P>::sort(DeviceParticles<P>& particles, const OwnPlanes& planes, cudaStream_t stream) {
   const unsigned count = particles.count();
   const ParticleView<Real> view = particles.view();
   tiles_ = blocks_ = tiled_ = lone_ = 0;
   if (count == 0) return;
-  sort_keys_.reserve(count);
-  order_.reserve(count);
-  const CompactKeys layout = place(particles, stream);
+  unsigned too_far = 0;
+  const CompactKeys layout = place(particles, too_far, stream);
+  if (too_far != 0) throw NumericsError(kTooFar);
   radix_sort(sort_keys_, order_, count, 0, kCellBits, scratch_, stream);
   launch_compact_keys(key_of_particle_.data(), order_.data(), sort_keys_.data(), count, layout, stream);
   radix_sort(sort_keys_, order_, count, 0, layout.all_bits(), scratch_, stream);
   find_runs(count, stream);
-  separate(view, count, stream);
+  separate(view, count, planes, stream);
 
   source_.reserve(count);
   next_keys_.reserve(count);
@@ -78,15 +78,17 @@ void DeviceGrid<P>::sort(DeviceParticles<P>& particles, cudaStream_t stream) {
 }
 
 template <class P>
-CompactKeys DeviceGrid<P>::place(const DeviceParticles<P>& particles, cudaStream_t stream) {
+CompactKeys DeviceGrid<P>::place(const DeviceParticles<P>& particles, unsigned& too_far, cudaStream_t stream) {
+  too_far = 0;
+  if (particles.count() == 0) return {};
+  sort_keys_.reserve(particles.count());
+  order_.reserve(particles.count());
   place_report_.reserve(1);
   place_report_.fill_bytes(0, stream);
   launch_place(particles.view().node, key_of_particle_.data(), sort_keys_.data(), order_.data(), particles.count(),
                periodicity_, place_report_.data(), stream);
   const PlaceReport report = place_report_.download(1, stream)[0];
-  if (report.too_far != 0) {
-    throw NumericsError(std::to_string(report.too_far) + " particles are more than 4 million cells from the origin");
-  }
+  too_far = report.too_far;
   return compact_layout(report);
 }
 
@@ -110,10 +112,11 @@ void DeviceGrid<P>::find_runs(unsigned count, cudaStream_t stream) {
 }
 
 template <class P>
-void DeviceGrid<P>::separate(const ParticleView<Real>& view, unsigned count, cudaStream_t stream) {
+void DeviceGrid<P>::separate(const ParticleView<Real>& view, unsigned count, const OwnPlanes& planes,
+                             cudaStream_t stream) {
   const BlockHash hash = cleared_hash(runs_.count, stream);
   launch_insert_all(runs_.key, runs_.count, hash, stream);
-  launch_separate(runs_, hash, view.node, order_.data(), periodicity_, lone_without_grid_, stream);
+  launch_separate(runs_, hash, view.node, order_.data(), periodicity_, planes, lone_without_grid_, stream);
   exclusive_scan(runs_.tiles, runs_.count + 1, scratch_, stream);
   exclusive_scan(runs_.tiled, runs_.count + 1, scratch_, stream);
   tiles_ = number_at(runs_.tiles + runs_.count, stream);

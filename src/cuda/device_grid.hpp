@@ -10,6 +10,8 @@
 
 namespace breccia::cuda {
 
+inline constexpr const char* kTooFar = "particles are more than 4 million cells from the origin";
+
 template <class P>
 class DeviceGrid {
  public:
@@ -24,11 +26,16 @@ class DeviceGrid {
 
   /// Sorts particles and builds tiles and blocks anew. The host waits for counts. Throws NumericsError if a particle is
   /// too far from the origin.
-  void sort(DeviceParticles<P>& particles, cudaStream_t stream);
+  void sort(DeviceParticles<P>& particles, const OwnPlanes& planes, cudaStream_t stream);
+  /// Renews the blocks of the particles without sorting them; `too_far` counts those that have none.
+  CompactKeys place(const DeviceParticles<P>& particles, unsigned& too_far, cudaStream_t stream);
   /// Counts lone particles that drifted further than the sorting allowed for into `strayed`.
   void count_lone_drift(const DeviceParticles<P>& particles, unsigned* strayed, cudaStream_t stream) const;
 
   [[nodiscard]] GridView<Real> view() const;
+  [[nodiscard]] std::vector<grid::BlockKey> block_keys(cudaStream_t stream) const {
+    return block_keys_.download(blocks_, stream);
+  }
   [[nodiscard]] unsigned tiles() const { return tiles_; }
   [[nodiscard]] unsigned blocks() const { return blocks_; }
   [[nodiscard]] unsigned tiled_particles() const { return tiled_; }
@@ -39,9 +46,8 @@ class DeviceGrid {
   [[nodiscard]] std::size_t bytes() const;
 
  private:
-  CompactKeys place(const DeviceParticles<P>& particles, cudaStream_t stream);
   void find_runs(unsigned count, cudaStream_t stream);
-  void separate(const ParticleView<Real>& view, unsigned count, cudaStream_t stream);
+  void separate(const ParticleView<Real>& view, unsigned count, const OwnPlanes& planes, cudaStream_t stream);
   void connect(const ParticleView<Real>& view, cudaStream_t stream);
   BlockHash cleared_hash(std::size_t entries, cudaStream_t stream);
 

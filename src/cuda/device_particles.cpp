@@ -148,6 +148,80 @@ void DeviceParticles<P>::rearrange(const unsigned* source, cudaStream_t stream) 
 }
 
 template <class P>
+std::size_t DeviceParticles<P>::record_bytes() const {
+  std::size_t bytes = 0;
+  for (const Field& field : fields_) bytes += word_bytes(*field.descriptor) * components(*field.descriptor);
+  return bytes;
+}
+
+template <class P>
+std::size_t DeviceParticles<P>::place_in_record(std::string_view name) const {
+  std::size_t place = 0;
+  for (const Field& field : fields_) {
+    if (field.descriptor->name == name) break;
+    place += word_bytes(*field.descriptor) * components(*field.descriptor);
+  }
+  return place;
+}
+
+template <class P>
+std::vector<std::byte> DeviceParticles<P>::extract(std::span<const unsigned> slots, cudaStream_t stream) {
+  const std::size_t record = record_bytes();
+  std::vector<std::byte> records(slots.size() * record);
+  if (slots.empty()) return records;
+  DeviceArray<unsigned> source(slots.size());
+  source.upload(slots, stream);
+  std::size_t place = 0;
+  for (const Field& field : fields_) {
+    const std::size_t word = word_bytes(*field.descriptor);
+    for (std::size_t c = 0; c < components(*field.descriptor); ++c, place += word) {
+      launch_gather_words(field.data.data() + c * count_ * word, scratch_.data(), source.data(),
+                          static_cast<unsigned>(slots.size()), field.descriptor->element_bytes, stream);
+      const std::vector<std::byte> plane = scratch_.download(slots.size() * word, stream);
+      for (std::size_t i = 0; i < slots.size(); ++i) {
+        std::memcpy(records.data() + i * record + place, plane.data() + i * word, word);
+      }
+    }
+  }
+  return records;
+}
+
+template <class P>
+void DeviceParticles<P>::replace(std::span<const unsigned> slots, std::span<const std::byte> records,
+                                 cudaStream_t stream) {
+  const std::size_t record = record_bytes();
+  const std::size_t arrivals = records.size() / record;
+  const std::size_t count = slots.size() + arrivals;
+  DeviceArray<unsigned> source(slots.size());
+  source.upload(slots, stream);
+  std::size_t place = 0;
+  std::vector<std::byte> plane;
+  for (Field& field : fields_) {
+    const std::size_t word = word_bytes(*field.descriptor);
+    DeviceArray<std::byte> data(count * word * components(*field.descriptor));
+    for (std::size_t c = 0; c < components(*field.descriptor); ++c, place += word) {
+      std::byte* to = data.data() + c * count * word;
+      if (!slots.empty()) {
+        launch_gather_words(field.data.data() + c * count_ * word, to, source.data(),
+                            static_cast<unsigned>(slots.size()), field.descriptor->element_bytes, stream);
+      }
+      if (arrivals == 0) continue;
+      plane.resize(arrivals * word);
+      for (std::size_t i = 0; i < arrivals; ++i) {
+        std::memcpy(plane.data() + i * word, records.data() + i * record + place, word);
+      }
+      check(cudaMemcpyAsync(to + slots.size() * word, plane.data(), plane.size(), cudaMemcpyHostToDevice, stream),
+            "upload");
+      check(cudaStreamSynchronize(stream), "upload");
+    }
+    field.data = std::move(data);
+  }
+  count_ = static_cast<unsigned>(count);
+  stride_ = count_;
+  scratch_.reserve(count * sizeof(double));
+}
+
+template <class P>
 void DeviceParticles<P>::drop_damage() {
   groups_.flaws = false;
   groups_.damage_level = false;

@@ -41,6 +41,13 @@ class DeviceParticles {
 
   /// new slot s holds what source[s] held, source of `count` entries on the device.
   void rearrange(const unsigned* source, cudaStream_t stream);
+  /// All fields of some particles, record after record, fields in their order.
+  [[nodiscard]] std::size_t record_bytes() const;
+  /// Place of a field in a record.
+  [[nodiscard]] std::size_t place_in_record(std::string_view name) const;
+  [[nodiscard]] std::vector<std::byte> extract(std::span<const unsigned> slots, cudaStream_t stream);
+  /// Keeps the particles of `slots` in this order and puts those of the records behind them.
+  void replace(std::span<const unsigned> slots, std::span<const std::byte> records, cudaStream_t stream);
   /// Frees what only damage growth needs.
   void drop_damage();
 

@@ -22,6 +22,10 @@ void launch_tile_pass(const PassArguments<Real>& a, cudaStream_t stream);
 /// The whole pass over lone particles (lone_pass.cuh).
 template <class Real>
 void launch_lone_pass(const PassArguments<Real>& a, cudaStream_t stream);
+/// to[n][kSums][64] := sums of this rank's tiles at the nodes of blocks[n].
+template <class Real>
+void launch_collect_shared(const GridView<Real>& grid, const unsigned* blocks, unsigned count, Real* to,
+                           cudaStream_t stream);
 /// v^{n+1/2} = v^{n-1/2} + kick f/m at every node of every block, walls included.
 template <class Real>
 void launch_node_update(const NodeArguments<Real>& a, cudaStream_t stream);

@@ -2,6 +2,7 @@
 #include "cuda/check.hpp"
 #include "cuda/launchers.hpp"
 #include "cuda/node_order.hpp"
+#include "cuda/node_sums.hpp"
 #include "grid/wall.hpp"
 
 namespace breccia::cuda {
@@ -9,28 +10,22 @@ namespace {
 
 constexpr unsigned kThreads = 128;
 
-// Sums of all tiles that reach a node: along each axis its own and the nearer neighbour.
+// What other ranks hold of the node joins in the order of ranks: all of them find the same bits.
 template <class Real>
-BRECCIA_HD void collect(const GridView<Real>& grid, unsigned block, NodePosition n, Real (&sums)[kSums]) {
-  const int position[3] = {n.x, n.y, n.z};
-  for (int corner = 0; corner < 8; ++corner) {
-    int direction[3];
-    int local[3];
-    for (int axis = 0; axis < 3; ++axis) {
-      const int side = position[axis] < grid::kTileMargin ? -1 : 1;
-      direction[axis] = (corner >> axis & 1) != 0 ? side : 0;
-      local[axis] = position[axis] + grid::kTileMargin - grid::kBlockWidth * direction[axis];
-    }
-    const unsigned tile =
-        grid.neighbours[block * 27 +
-                        static_cast<unsigned>(((direction[0] + 1) * 3 + direction[1] + 1) * 3 + direction[2] + 1)];
-    if (tile >= grid.tiles) continue;
-    const PackedBox box = grid.boxes[tile];
-    if (!box_holds(box, local[0], 0) || !box_holds(box, local[1], 1) || !box_holds(box, local[2], 2)) continue;
-    const Real* from = grid.partial_sums + std::size_t{tile} * kSums * kTileNodes +
-                       node_place<grid::kTileWidth>(local[0], local[1], local[2]);
-    for (int c = 0; c < kSums; ++c) sums[c] += from[c * kTileNodes];
+BRECCIA_HD void add_shared(const SharedView<Real>& shared, unsigned list, unsigned place, Real (&sums)[kSums]) {
+  Real total[kSums] = {};
+  const auto add_own = [&] {
+    for (int c = 0; c < kSums; ++c) total[c] += sums[c];
+  };
+  const unsigned first = shared.first[list];
+  const unsigned last = shared.first[list + 1];
+  for (unsigned n = first; n < last; ++n) {
+    if (n == first + shared.lower[list]) add_own();
+    const Real* from = shared.received + std::size_t{shared.places[n]} * kSums * grid::kBlockNodes + place;
+    for (int c = 0; c < kSums; ++c) total[c] += from[c * grid::kBlockNodes];
   }
+  if (shared.lower[list] == last - first) add_own();
+  for (int c = 0; c < kSums; ++c) sums[c] = total[c];
 }
 
 template <class Real>
@@ -57,6 +52,10 @@ __global__ void __launch_bounds__(kThreads) node_update(NodeArguments<Real> a) {
   const NodePosition n = node_position<grid::kBlockWidth>(static_cast<int>(place));
   Real sums[kSums] = {};
   collect(a.grid, block, n, sums);
+  if (a.shared.list_of_block != nullptr) {
+    const unsigned list = a.shared.list_of_block[block];
+    if (list != grid::kNoBlock) add_shared(a.shared, list, place, sums);
+  }
   Real v[kVelocities] = {};
   if (sums[kMass] > a.smallest_mass) {
     const Real per_mass = Real(1) / sums[kMass];
@@ -73,7 +72,29 @@ __global__ void __launch_bounds__(kThreads) node_update(NodeArguments<Real> a) {
   to[kMass * grid::kBlockNodes] = sums[kMass];
 }
 
+// Sums of this rank's tiles at the nodes of some blocks, to be sent.
+template <class Real>
+__global__ void __launch_bounds__(kThreads)
+    collect_shared(GridView<Real> g, const unsigned* blocks, unsigned count, Real* to) {
+  const unsigned node = blockIdx.x * kThreads + threadIdx.x;
+  const unsigned n = node / grid::kBlockNodes;
+  if (n >= count) return;
+  const unsigned place = node % grid::kBlockNodes;
+  Real sums[kSums] = {};
+  collect(g, blocks[n], node_position<grid::kBlockWidth>(static_cast<int>(place)), sums);
+  for (unsigned c = 0; c < kSums; ++c) to[(n * kSums + c) * grid::kBlockNodes + place] = sums[c];
+}
+
 }  // namespace
+
+template <class Real>
+void launch_collect_shared(const GridView<Real>& view, const unsigned* blocks, unsigned count, Real* to,
+                           cudaStream_t stream) {
+  if (count == 0) return;
+  BRECCIA_LAUNCH(collect_shared<Real>, dim3(blocks_for(count * grid::kBlockNodes, kThreads)), dim3(kThreads), 0, stream,
+                 view, blocks, count, to);
+  check(cudaGetLastError(), "launch of the halo");
+}
 
 template <class Real>
 void launch_node_update(const NodeArguments<Real>& a, cudaStream_t stream) {
@@ -83,6 +104,8 @@ void launch_node_update(const NodeArguments<Real>& a, cudaStream_t stream) {
   check(cudaGetLastError(), "launch of the node update");
 }
 
+template void launch_collect_shared<float>(const GridView<float>&, const unsigned*, unsigned, float*, cudaStream_t);
+template void launch_collect_shared<double>(const GridView<double>&, const unsigned*, unsigned, double*, cudaStream_t);
 template void launch_node_update<float>(const NodeArguments<float>&, cudaStream_t);
 template void launch_node_update<double>(const NodeArguments<double>&, cudaStream_t);
 

@@ -33,10 +33,6 @@ struct ParticleStress {
   Sym3<Real> tau;       ///< Kirchhoff stress [Pa]
 };
 
-/// How far a particle has moved whose state is not finite any more [cells].
-template <class Real>
-inline constexpr Real kNotFinite = Real(1e30);
-
 /// What the pass of one particle adds to the report.
 template <class Real>
 struct Found {
@@ -265,7 +261,7 @@ BRECCIA_HD Found<Real> pass_over_particle(const PassArguments<Real>& a, unsigned
   }
   const Real sum = motion.velocity[0] + motion.velocity[1] + motion.velocity[2] + state.energy.value() +
                    state.volume.value() + (out.tau.xx + out.tau.yy + out.tau.zz);
-  if (!(sum - sum == Real(0))) found.moved = kNotFinite<Real>;
+  if (!(sum - sum == Real(0))) found.moved = static_cast<Real>(kNotFinite);
   store_state(p, fx, slot, state);
   return found;
 }

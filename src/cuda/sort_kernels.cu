@@ -104,8 +104,12 @@ constexpr int kReach = 2 + 2;
 
 __device__ __forceinline__ bool is_alone(const Runs& runs, unsigned run, const BlockHash& hash,
                                          const std::int32_t* node, const unsigned* order,
-                                         const grid::Periodicity& periodicity) {
+                                         const grid::Periodicity& periodicity, const OwnPlanes& planes) {
   const BlockCoord own = grid::block_coord(runs.key[run]);
+  for (int side = -1; side <= 1; ++side) {
+    const std::int32_t plane = periodicity.wrap(grid::component(own, planes.axis) + side, planes.axis);
+    if (plane < planes.low || plane >= planes.high) return false;
+  }
   const std::int32_t here = node[order[runs.first[run]]];
   for (int n = 0; n < 27; ++n) {
     if (n == 13) continue;
@@ -125,7 +129,7 @@ __device__ __forceinline__ bool is_alone(const Runs& runs, unsigned run, const B
 }
 
 __global__ void separate(Runs runs, BlockHash hash, const std::int32_t* node, const unsigned* order,
-                         grid::Periodicity periodicity, bool lone_without_grid) {
+                         grid::Periodicity periodicity, OwnPlanes planes, bool lone_without_grid) {
   const unsigned run = thread_in_grid(blockIdx.x, threadIdx.x);
   if (run > runs.count) return;
   if (run == runs.count) {
@@ -133,7 +137,7 @@ __global__ void separate(Runs runs, BlockHash hash, const std::int32_t* node, co
     return;
   }
   const unsigned particles = runs.first[run + 1] - runs.first[run];
-  const bool lone = lone_without_grid && particles == 1 && is_alone(runs, run, hash, node, order, periodicity);
+  const bool lone = lone_without_grid && particles == 1 && is_alone(runs, run, hash, node, order, periodicity, planes);
   runs.tiles[run] = lone ? 0U : 1U;
   runs.tiled[run] = lone ? 0U : particles;
 }
@@ -271,9 +275,10 @@ void launch_insert_all(const BlockKey* keys, unsigned count, const BlockHash& ha
 }
 
 void launch_separate(const Runs& runs, const BlockHash& hash, const std::int32_t* node, const unsigned* order,
-                     const grid::Periodicity& periodicity, bool lone_without_grid, cudaStream_t stream) {
+                     const grid::Periodicity& periodicity, const OwnPlanes& planes, bool lone_without_grid,
+                     cudaStream_t stream) {
   BRECCIA_LAUNCH(separate, grid_for(runs.count + 1), dim3(kThreads), 0, stream, runs, hash, node, order, periodicity,
-                 lone_without_grid);
+                 planes, lone_without_grid);
   launched();
 }
 

@@ -48,9 +48,15 @@ void launch_list_runs(const grid::BlockKey* keys, const unsigned* order, const R
 /// indices of the hash := 0 .. count-1 for these keys.
 void launch_insert_all(const grid::BlockKey* keys, unsigned count, const BlockHash& hash, cudaStream_t stream);
 
+/// Planes of blocks along an axis that belong to this rank: low <= plane < high. What others hold is not known here.
+struct OwnPlanes {
+  int axis = 0;
+  std::int32_t low = INT32_MIN, high = INT32_MAX;
+};
 /// tiles[r] = 1 and tiled[r] = particles unless the run is one particle that no other can meet before the next sorting.
 void launch_separate(const Runs& runs, const BlockHash& hash, const std::int32_t* node, const unsigned* order,
-                     const grid::Periodicity& periodicity, bool lone_without_grid, cudaStream_t stream);
+                     const grid::Periodicity& periodicity, const OwnPlanes& planes, bool lone_without_grid,
+                     cudaStream_t stream);
 
 /// source[slot] := where the particle of a new slot is now; tiles first, then lone particles.
 void launch_arrange(const Runs& runs, const unsigned* order, unsigned tiled_particles, unsigned* source,

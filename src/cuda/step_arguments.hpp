@@ -31,6 +31,9 @@ BRECCIA_HD bool box_holds(PackedBox box, int node, int axis) {
   return first <= node && node <= last;
 }
 
+/// How far a particle counts as moved whose state is not finite any more [cells].
+inline constexpr double kNotFinite = 1e30;
+
 /// What a tile, or a thread block of lone particles, found: works since the last sorting, move of the last pass.
 struct PassSums {
   double plastic_work;  ///< [J]
@@ -49,6 +52,16 @@ struct GridView {
   PackedBox* boxes = nullptr;                  ///< [tiles]
   Real* partial_sums = nullptr;                ///< [tiles][kSums][512] what each tile scatters
   Real* velocities = nullptr;                  ///< [blocks][kSums][64]
+};
+
+/// Blocks that other ranks' particles reach too: what those ranks hold of them (halo.hpp). Null pointers on one rank.
+template <class Real>
+struct SharedView {
+  const unsigned* list_of_block = nullptr;  ///< [blocks] kNoBlock where no other rank reaches
+  const unsigned* first = nullptr;          ///< [lists + 1] into `places`; contributions in the order of their ranks
+  const unsigned* lower = nullptr;          ///< [lists] how many of them come from lower ranks than this one
+  const unsigned* places = nullptr;         ///< of a block's sums in `received`
+  const Real* received = nullptr;           ///< [place][kSums][64]
 };
 
 /// Transfer after physics.md 5: d = alpha (v_p - v_old); v_p = v_new + d; x += dt (v_new + beta d).
@@ -91,6 +104,7 @@ struct PassArguments {
 template <class Real>
 struct NodeArguments {
   GridView<Real> grid;
+  SharedView<Real> shared;
   Real kick = 0;           ///< dt of the kick [s]
   Real smallest_mass = 0;  ///< nodes with less are empty (hard case 2) [kg]
   double cell = 0;         ///< [m]

@@ -71,7 +71,6 @@ std::unique_ptr<Engine> make_cuda_engine(const EngineSetup& setup, const mpi::Co
 EngineChoice choose_engine(Device wanted, const mpi::Comm& comm) {
   if (wanted == Device::kHost) return {&make_host_engine, "host", ""};
   auto [name, why_not] = select(rank_on_node(comm));
-  if (why_not.empty() && comm.size() > 1) why_not = "the CUDA engine runs on one rank only";
   if (!comm.any(!why_not.empty())) return {&make_cuda_engine, "cuda", name};
   if (why_not.empty()) why_not = "other ranks have no CUDA device";
   if (wanted == Device::kCuda) {

@@ -92,6 +92,8 @@ class Engine {
 
   /// The whole state, only between sort() and the scatter() that follows.
   [[nodiscard]] virtual EngineState save() const = 0;
+  /// The flaws of the particles in the order of save(); empty lists if damage does not grow.
+  [[nodiscard]] virtual material::FlawLists flaws() const = 0;
   /// Takes a saved state in place of insert(), with the flaws that its particles were inserted with (empty lists if
   /// damage does not grow): a scatter() that follows gives the same bits as after save(), if the state comes from as
   /// many ranks. Collective. Throws IoError if a field is missing.

@@ -43,6 +43,7 @@ class HostEngine final : public Engine {
   void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
               std::span<const Vec3d> spin_of_body) override;
   [[nodiscard]] EngineState save() const override;
+  [[nodiscard]] material::FlawLists flaws() const override;
   void restore(const EngineState& state, const material::FlawLists& flaws) override;
   void sort() override;
   void scatter(double half_step) override;

@@ -63,6 +63,22 @@ void HostEngine<P>::save_flaws(std::span<const Placement> placements, EngineStat
 }
 
 template <class P>
+material::FlawLists HostEngine<P>::flaws() const {
+  material::FlawLists lists;
+  lists.first.push_back(0);
+  for_each_particle([&](std::size_t slot, BlockCoord) {
+    if (store_.has(Group::kFlaws)) {
+      const Flaws<P>& f = store_.flaws[slot / kLanes];
+      const int lane = static_cast<int>(slot % kLanes);
+      const auto own = flaw_thresholds_.begin() + f.first[lane];
+      lists.threshold.insert(lists.threshold.end(), own, own + (f.count[lane] >> 16));
+    }
+    lists.first.push_back(static_cast<std::uint32_t>(lists.threshold.size()));
+  });
+  return lists;
+}
+
+template <class P>
 void HostEngine<P>::restore(const EngineState& state, const material::FlawLists& flaws) {
   if (state.damage_finished && setup_.effects.damage) switch_damage_off();
   std::vector<Placement> placements;

@@ -64,6 +64,13 @@ class Device(CommandTest):
         for name in ("kinetic_energy [J]", "internal_energy [J]", "mass [kg]"):
             self.assertAlmostEqual(float(cuda[name]) / float(host[name]), 1.0, delta=1e-5, msg=name)
 
+    def test_a_device_for_each_rank(self):
+        with devices(EMULATED):
+            process = self.run_scene("two", "--device", "cuda", ranks=2)
+            self.assertEqual(process.returncode, 0, process.stderr)
+            self.assertEqual(process.stdout.count("device: cuda (emulated device (1 of 1)"), 1)
+        self.assertEqual((self.summary("two")["device"], self.summary("two")["ranks"]), ("cuda", 2))
+
     def test_run_continues_on_the_other_device(self):
         with devices(EMULATED):
             first = self.run_scene("out", "--walltime", "0", "--device", "cuda")

@@ -23,12 +23,12 @@ __global__ void sum_of_blocks(int* total) {
   values.of[kFault == Fault::kOverrun ? t + 2 : kThreads - 1 - t] = t;
   if (kFault == Fault::kEarlyExit && t == 5) return;
   if (kFault == Fault::kDivergentBarrier && t >= 32) {
-    __syncthreads();
+    __syncthreads();  // NOLINT(bugprone-branch-clone): another one than the next
   } else if (kFault != Fault::kNoBarrier) {
     __syncthreads();
   }
   int sum = 0;
-  for (int n = 0; n < kThreads; ++n) sum += values.of[n];
+  for (const int value : values.of) sum += value;
   if (kFault == Fault::kLostLane) {
     if (t % 2 == 0) sum = __shfl_sync(0xffffffffU, sum, 0);
   }

@@ -138,6 +138,15 @@ cudaError_t cudaFree(void* address) {
   return cudaSuccess;
 }
 
+cudaError_t cudaMallocHost(void** address, std::size_t bytes) {
+  *address = std::malloc(bytes);
+  return *address != nullptr ? cudaSuccess : cudaErrorMemoryAllocation;
+}
+cudaError_t cudaFreeHost(void* address) {
+  std::free(address);
+  return cudaSuccess;
+}
+
 cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind, cudaStream_t stream) {
   if (bytes == 0) return cudaSuccess;
   const bool to_device = kind != cudaMemcpyDeviceToHost;
