@@ -66,7 +66,9 @@ void Fiber::start(void (*entry)()) {
       mmap(nullptr, kStackBytes, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS | MAP_NORESERVE, -1, 0));
   if (stack_ == MAP_FAILED) std::abort();
 #endif
+#if defined(__SANITIZE_ADDRESS__)
   fake_stack_ = nullptr;
+#endif
   auto** top = reinterpret_cast<void**>(stack_ + kStackBytes);
   *--top = nullptr;  // keeps the alignment that a call would leave
   *--top = reinterpret_cast<void*>(entry);

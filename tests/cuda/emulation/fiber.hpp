@@ -38,12 +38,16 @@ class Fiber {
   std::byte* stack_;
   void* stack_pointer_ = nullptr;
   void* scheduler_pointer_ = nullptr;
-  void* fake_stack_ = nullptr;            // address sanitizer
-  void* scheduler_fake_stack_ = nullptr;  // address sanitizer
+#if defined(__SANITIZE_ADDRESS__)
+  void* fake_stack_ = nullptr;
+  void* scheduler_fake_stack_ = nullptr;
   const void* scheduler_stack_ = nullptr;
   std::size_t scheduler_stack_bytes_ = 0;
-  std::vector<void*> threads_;        // thread sanitizer: this start's last
-  void* scheduler_thread_ = nullptr;  // thread sanitizer
+#endif
+#if defined(BRECCIA_EMULATION_TSAN)
+  std::vector<void*> threads_;  // this start's last
+  void* scheduler_thread_ = nullptr;
+#endif
 };
 
 }  // namespace breccia::cuda_emulation
