@@ -160,8 +160,7 @@ class Output {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-void print_profile(const StageTimers& timers, const std::string& decision, const nlohmann::json& gravity,
-                   double wall) {
+void print_profile(const StageTimers& timers, const std::string& decision, const nlohmann::json& gravity, double wall) {
   fmt::print("{:<20} {:>10} {:>7} {:>10}\n", "stage", "seconds", "%", "calls");
   for (const StageTimers::Stage& s : timers.stages()) {
     fmt::print("{:<20} {:>10.3f} {:>7.1f} {:>10}\n", s.name, s.seconds, 100.0 * s.seconds / wall, s.calls);
