@@ -1,7 +1,7 @@
 # What a user may choose, and the flags every target shares.
 option(BRECCIA_TESTS "Build the tests" ON)
 option(BRECCIA_FUZZ "Build the libFuzzer targets of tests/fuzz (needs clang)" OFF)
-option(BRECCIA_CUDA "Compile the physics for CUDA devices too (needs nvcc; a check, there is no CUDA engine yet)" OFF)
+option(BRECCIA_CUDA "Build the CUDA engine (needs nvcc; the program runs without it and without a device)" OFF)
 set(BRECCIA_SANITIZE "" CACHE STRING "Sanitizers for every target, e.g. address,undefined")
 set(BRECCIA_ISAS "x86-64-v2;x86-64-v3;x86-64-v4" CACHE STRING
     "Instruction sets the kernel files are compiled for; the best one the processor has is taken at start")

@@ -34,11 +34,12 @@ PlaneRange touched_planes(const ClusterArrays<Real>& particles) {
 }  // namespace
 
 template <class Real>
-BoxMesh<Real>::BoxMesh(const MeshSize& size, const GaussianSplit& split, const mpi::Comm& comm, int threads)
+BoxMesh<Real>::BoxMesh(const MeshSize& size, const GaussianSplit& split, const mpi::Comm& comm, int threads,
+                       const MeshSharing& sharing)
     : size_(size), comm_(comm), threads_(threads) {
   const double doubled = 1.0 * size.padded[0] * size.padded[1] * size.padded[2];
-  const bool replicated = comm.size() == 1 || doubled <= kReplicatedNodes;
-  const int active = replicated ? 1 : std::min(comm.size(), size.nodes[0]);
+  const bool replicated = comm.size() == 1 || doubled <= sharing.replicated_nodes;
+  const int active = replicated ? 1 : std::clamp(size.nodes[0] / sharing.least_planes, 1, comm.size());
   if (replicated) {
     MPI_Comm_dup(MPI_COMM_SELF, &transformers_);
     owners_.assign(static_cast<std::size_t>(comm.size()), PlaneRange{0, size.nodes[0]});

@@ -16,15 +16,19 @@ namespace breccia::gravity {
 template <class Real>
 using SlotField = std::array<AlignedVector<Real>, 4>;
 
-/// A mesh of one size. Meshes of up to kReplicatedNodes doubled nodes are transformed by every rank for itself; larger
-/// ones are dealt out to as many ranks as there are planes.
+/// Which ranks transform a mesh.
+struct MeshSharing {
+  double replicated_nodes = 1e6;  ///< meshes of up to so many nodes, doubled, each rank transforms for itself
+  int least_planes = 4;           ///< of larger ones each rank has as many, or none: fewer cost more to send than to do
+};
+
+/// A mesh of one size.
 template <class Real>
 class BoxMesh {
  public:
-  static constexpr double kReplicatedNodes = 1e6;
-
   /// `split` in cells. Collective.
-  BoxMesh(const MeshSize& size, const GaussianSplit& split, const mpi::Comm& comm, int threads);
+  BoxMesh(const MeshSize& size, const GaussianSplit& split, const mpi::Comm& comm, int threads,
+          const MeshSharing& sharing = {});
   ~BoxMesh();
   BoxMesh(const BoxMesh&) = delete;
   BoxMesh& operator=(const BoxMesh&) = delete;

@@ -26,11 +26,11 @@ struct alignas(64) Cell {
   std::int32_t key_bits = 0;        ///< leading key bits its particles share
   bool is_target = true;            ///< holds particles whose field this rank computes
 
-  [[nodiscard]] bool is_leaf() const { return children <= 0; }
+  [[nodiscard]] BRECCIA_HD bool is_leaf() const { return children <= 0; }
   /// Has children or particles that this rank does not know.
-  [[nodiscard]] bool is_stub() const { return children < 0; }
+  [[nodiscard]] BRECCIA_HD bool is_stub() const { return children < 0; }
   /// Targets below this cell share its interactions.
-  [[nodiscard]] bool is_group() const { return count <= kGroupParticles || is_leaf(); }
+  [[nodiscard]] BRECCIA_HD bool is_group() const { return count <= kGroupParticles || is_leaf(); }
 };
 
 }  // namespace breccia::gravity

@@ -129,7 +129,9 @@ std::vector<char> wanted_by(const SharedTree& tree, int rank) {
   for (std::size_t i = wanted.size(); i-- > 0;) {
     if (leaf_of[i] != nullptr) continue;
     const Cell& c = tree.tree().cells[i];
-    for (std::int32_t k = 0; k < c.children; ++k) wanted[i] |= wanted[static_cast<std::size_t>(c.first_child + k)];
+    for (std::int32_t k = c.first_child; k < c.first_child + c.children; ++k) {
+      if (wanted[static_cast<std::size_t>(k)] != 0) wanted[i] = 1;
+    }
   }
   return wanted;
 }
@@ -157,8 +159,8 @@ Parcel pack(const SharedTree& sources, const std::vector<char>& opened, int rank
   for (const TopLeaf& leaf : sources.leaves()) {
     if (leaf.owner == rank && opened[static_cast<std::size_t>(leaf.cell)] != 0) add(leaf.cell, leaf.cell);
   }
-  for (std::size_t q = 0; q < queue.size(); ++q) {
-    const Cell& c = tree.cell(queue[q]);
+  for (std::size_t next = 0; next < queue.size();) {
+    const Cell& c = tree.cell(queue[next++]);
     for (std::int32_t k = 0; k < c.children; ++k) add(c.first_child + k, -1);
     for (std::int64_t i = c.begin; c.is_leaf() && i < c.end; ++i) {
       parcel.particles.push_back({tree.particles.position(i), tree.particles.mass[static_cast<std::size_t>(i)]});

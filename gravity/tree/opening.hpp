@@ -27,11 +27,11 @@ enum class Opening {
 };
 
 namespace detail {
-inline double square(double x) { return x * x; }
+BRECCIA_HD double square(double x) { return x * x; }
 
 /// All terms of the fourth order, x = (b + R)/D bounding the ratio of one to the next, and the octupole:
 /// M (x^4/(1-x)^2 + kOctupole (b/D)^3)/D^2 < largest_error, for x < 1; here without a division.
-inline bool expandable(const Cell& source, double size, double distance, double largest_error) {
+BRECCIA_HD bool expandable(const Cell& source, double size, double distance, double largest_error) {
   const double b = source.radius;
   const double d2 = distance * distance;
   const double rest = square(distance - size);
@@ -41,7 +41,7 @@ inline bool expandable(const Cell& source, double size, double distance, double 
 }  // namespace detail
 
 /// Whether `source` may be expanded around the centre of `target`.
-inline bool expandable(const Cell& source, const Cell& target, double largest_error) {
+BRECCIA_HD bool expandable(const Cell& source, const Cell& target, double largest_error) {
   const Vec3d d = target.centre - source.centre;
   const double d2 = dot(d, d);
   const double size = source.radius + target.radius;
@@ -51,7 +51,7 @@ inline bool expandable(const Cell& source, const Cell& target, double largest_er
 
 /// The cheapest way to take `source` for the particles of the group `target`. Seen whole, what is missing is the
 /// octupole at the nearest of them: kOctupole M b^3/(D - R)^5 < largest_error.
-inline Opening opening(const Cell& source, const Cell& target, double largest_error) {
+BRECCIA_HD Opening opening(const Cell& source, const Cell& target, double largest_error) {
   const Vec3d d = target.centre - source.centre;
   const double d2 = dot(d, d);
   if (d2 <= detail::square(target.radius + source.radius / kLargestOpening)) return Opening::kOpen;

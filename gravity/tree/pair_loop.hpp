@@ -9,6 +9,7 @@
 #include <type_traits>
 
 #include "breccia/pack.hpp"
+#include "gravity/pair_law.hpp"
 #include "gravity/rsqrt.hpp"
 
 namespace breccia::gravity::BRECCIA_ISA {
@@ -16,13 +17,6 @@ namespace breccia::gravity::BRECCIA_ISA {
 /// Sources summed in Real before the sum goes to double: few enough to keep float rounding, enough to make the
 /// conversion free, and their arrays fit the first-level cache.
 inline constexpr std::int64_t kSourceBlock = 256;
-
-/// What a pair adds per unit of source mass: acceleration `force` d, potential -`depth`; d = source - target.
-template <class V>
-struct PairWeight {
-  V force;
-  V depth;
-};
 
 /// Plummer-softened Newton: q^3 and q with q = 1/sqrt(d^2 + softening^2). Guarded, pairs closer than can be told from
 /// coincident count nothing; unguarded, the softening must keep q^3 finite.
@@ -35,7 +29,7 @@ struct NewtonPair {
   BRECCIA_HD PairWeight<V> operator()(V r2) const {
     V q = rsqrt(r2);
     if constexpr (kGuarded) q = select(r2 <= coincident_squared, V{}, q);
-    return {q * (q * q), q};
+    return newton_pair(q);
   }
 };
 

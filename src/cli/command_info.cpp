@@ -3,6 +3,7 @@
 #include "breccia/precision.hpp"
 #include "cli/command.hpp"
 #include "gravity/mesh/fft_plan.hpp"
+#include "grid/device.hpp"
 #include "io/machine.hpp"
 
 namespace breccia::cli {
@@ -15,7 +16,7 @@ void print_info(const mpi::Comm& comm) {
   fmt::print("fftw      {}\n", gravity::fft_library());
   fmt::print("simd      {}: {} floats or {} doubles at a time\n", machine.instruction_set, MixedPrecision::kLanes,
              DoublePrecision::kLanes);
-  fmt::print("cuda      not in this build\n");
+  fmt::print("cuda      {}\n", grid::describe_cuda());
   fmt::print("devices   host: {}, {} hardware threads\n", machine.cpu_model, machine.cores);
 }
 

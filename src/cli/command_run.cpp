@@ -44,14 +44,12 @@ double parse_walltime(const std::string& text) {
   return 3600.0 * number(1) + 60.0 * number(2) + number(3);
 }
 
-void check_device(const std::string& device) {
-  if (device == "cuda") {
-    throw UsageError("--device cuda: this build has only the host engine; use --device host or auto");
-  }
+grid::Device device_named(const std::string& name) {
+  if (name == "cuda") return grid::Device::kCuda;
+  return name == "host" ? grid::Device::kHost : grid::Device::kAuto;
 }
 
 void run(const Options& options, const mpi::Comm& comm) {
-  check_device(options.device);
   sim::RunOptions run_options;
   run_options.out = options.out;
   if (!options.until.empty()) run_options.until = parse_until(options.until);
@@ -59,6 +57,7 @@ void run(const Options& options, const mpi::Comm& comm) {
   run_options.restart = options.restart;
   if (!options.walltime.empty()) run_options.walltime = parse_walltime(options.walltime);
   run_options.threads = options.threads;
+  run_options.device = device_named(options.device);
   run_options.profile = options.profile;
   scene::LoadedScene loaded = load(options.scene, comm);
   run_options.resolved = std::move(loaded.keys);

@@ -6,6 +6,7 @@
 
 #include "breccia/error.hpp"
 #include "grid/tile.hpp"
+#include "grid/wall.hpp"
 
 namespace breccia::grid {
 namespace {
@@ -18,18 +19,6 @@ int axis_of(const Vec3d& normal) {
     if (std::abs(component(normal, axis)) > 1.0 - 1e-9) return axis;
   }
   return -1;
-}
-
-// The velocity a wall allows at a node inside it.
-Vec3d constrained(const BoundaryPlane& wall, Vec3d v) {
-  if (wall.kind == BoundaryKind::kStick) return {};
-  const double along_normal = dot(v, wall.normal);
-  const Vec3d tangential = v - along_normal * wall.normal;
-  if (wall.kind == BoundaryKind::kSlip) return tangential;
-  if (along_normal >= 0.0) return v;
-  const double speed = std::sqrt(dot(tangential, tangential));
-  const double lost = -wall.friction * along_normal;
-  return speed > lost ? (1.0 - lost / speed) * tangential : Vec3d{};
 }
 
 }  // namespace
@@ -69,8 +58,7 @@ void BoundarySet::find_nodes(std::span<const BlockKey> blocks) {
       const int k = kBlockWidth * block.z + n % 4;
       const Vec3d x = cell_ * Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
       for (std::size_t w = 0; w < walls_.size(); ++w) {
-        // A node on the plane belongs to the wall; rounding of x must not decide.
-        if (dot(x - walls_[w].point, walls_[w].normal) > 1e-6 * cell_) continue;
+        if (!holds_node(walls_[w], x, cell_)) continue;
         nodes_.push_back(
             {static_cast<std::uint32_t>(b * kBlockNodes + static_cast<std::size_t>(n)), static_cast<std::uint32_t>(w)});
       }

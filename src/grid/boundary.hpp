@@ -18,6 +18,7 @@ class BoundarySet {
   [[nodiscard]] const Periodicity& periodicity() const { return periodicity_; }
   /// True if there are planes other than periodic ones.
   [[nodiscard]] bool has_walls() const { return !walls_.empty(); }
+  [[nodiscard]] std::span<const BoundaryPlane> walls() const { return walls_; }
   /// Finds the nodes of these blocks that lie in or behind a wall.
   void find_nodes(std::span<const BlockKey> blocks);
   /// Applies the walls to v^{n+1/2} of the found nodes. `velocities` as in tile.hpp.

@@ -53,13 +53,14 @@ struct ParticleFault {
   bool finite = false;  ///< false: not finite; true: it moved a cell or more in one step
 };
 
-/// Sums of a pass over this rank's particles.
+/// What the passes over this rank's particles found.
 struct PassReport {
-  double plastic_work = 0.0;  ///< [J]
-  double viscous_work = 0.0;  ///< [J]
-  double largest_move = 0.0;  ///< [cells]
-  std::uint64_t clamped = 0;  ///< particles whose volume change was cut: det(I + dt L) <= 0.1 (hard case 3)
-  std::optional<ParticleFault> fault;
+  double plastic_work = 0.0;  ///< of all passes since the last sorting [J]
+  double viscous_work = 0.0;  ///< of all passes since the last sorting [J]
+  double largest_move = 0.0;  ///< of the last pass [cells]
+  std::uint64_t clamped = 0;  ///< volume changes cut since the last sorting: det(I + dt L) <= 0.1 (hard case 3)
+  std::optional<ParticleFault> fault;  ///< the first since the last sorting
+  std::uint64_t fault_step = 0;        ///< gathers between the last sorting and the one with the fault
 };
 
 /// Fastest signals over all ranks, for the time step.
@@ -91,6 +92,8 @@ class Engine {
 
   /// The whole state, only between sort() and the scatter() that follows.
   [[nodiscard]] virtual EngineState save() const = 0;
+  /// The flaws of the particles in the order of save(); empty lists if damage does not grow.
+  [[nodiscard]] virtual material::FlawLists flaws() const = 0;
   /// Takes a saved state in place of insert(), with the flaws that its particles were inserted with (empty lists if
   /// damage does not grow): a scatter() that follows gives the same bits as after save(), if the state comes from as
   /// many ranks. Collective. Throws IoError if a field is missing.
@@ -136,10 +139,15 @@ class Engine {
   /// only between gather() and scatter().
   virtual bool finish_damage() = 0;
 
-  [[nodiscard]] virtual const PassReport& last_pass() const = 0;
+  /// May wait for a device: not meant for every step.
+  [[nodiscard]] virtual PassReport passes() const = 0;
   [[nodiscard]] virtual EngineStats stats() const = 0;
 };
 
-std::unique_ptr<Engine> make_engine(const EngineSetup& setup, const mpi::Comm& comm);
+/// The engine on host cores.
+std::unique_ptr<Engine> make_host_engine(const EngineSetup& setup, const mpi::Comm& comm);
+
+/// Makes engines of one kind; which one the user wants is decided in grid/device.hpp.
+using EngineMaker = std::unique_ptr<Engine> (*)(const EngineSetup& setup, const mpi::Comm& comm);
 
 }  // namespace breccia::grid

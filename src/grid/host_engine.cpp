@@ -6,6 +6,7 @@
 #include <stdexcept>
 
 #include "breccia/error.hpp"
+#include "grid/setup_choices.hpp"
 
 namespace breccia::grid {
 namespace {
@@ -14,27 +15,6 @@ namespace {
 void flush_denormals() {
   _MM_SET_FLUSH_ZERO_MODE(_MM_FLUSH_ZERO_ON);
   _MM_SET_DENORMALS_ZERO_MODE(_MM_DENORMALS_ZERO_ON);
-}
-
-GroupSet groups_for(const EngineSetup& setup) {
-  const material::RuntimeEffects& fx = setup.effects;
-  return {.elastic = fx.shear,
-          .energy = fx.energy,
-          .damage_level = (fx.strength || fx.damage) && !fx.fully_damaged,
-          .flaws = fx.damage,
-          .gravity = setup.self_gravity};
-}
-
-TransferParameters transfer_for(const NumericsParameters& numerics) {
-  switch (numerics.transfer) {
-    case Transfer::kApic:
-      return {.alpha = 0.0, .beta = 0.0, .affine = true};
-    case Transfer::kFlip:
-      return {.alpha = numerics.asflip_alpha, .beta = 0.0, .affine = false};
-    case Transfer::kAsflip:
-      break;
-  }
-  return {.alpha = numerics.asflip_alpha, .beta = numerics.asflip_beta, .affine = true};
 }
 
 }  // namespace
@@ -182,7 +162,7 @@ void HostEngine<P>::kick_velocities(double time) {
   });
 }
 
-std::unique_ptr<Engine> make_engine(const EngineSetup& setup, const mpi::Comm& comm) {
+std::unique_ptr<Engine> make_host_engine(const EngineSetup& setup, const mpi::Comm& comm) {
   if (setup.numerics.precision == Precision::kDouble) {
     return std::make_unique<HostEngine<DoublePrecision>>(setup, comm);
   }

@@ -43,6 +43,7 @@ class HostEngine final : public Engine {
   void insert(const ParticleArrays& particles, const material::FlawLists& flaws,
               std::span<const Vec3d> spin_of_body) override;
   [[nodiscard]] EngineState save() const override;
+  [[nodiscard]] material::FlawLists flaws() const override;
   void restore(const EngineState& state, const material::FlawLists& flaws) override;
   void sort() override;
   void scatter(double half_step) override;
@@ -60,7 +61,7 @@ class HostEngine final : public Engine {
   [[nodiscard]] double elastic_energy() const override;
   [[nodiscard]] SignalSpeeds signal_speeds() const override;
   bool finish_damage() override;
-  [[nodiscard]] const PassReport& last_pass() const override { return report_; }
+  [[nodiscard]] PassReport passes() const override { return report_; }
   [[nodiscard]] EngineStats stats() const override;
 
  private:
@@ -157,7 +158,8 @@ class HostEngine final : public Engine {
   mpi::Slabs slabs_;
   mpi::Halo<Real, kChannels> halo_;
   PassReport report_;
-  PassFault fault_;  // of the last pass
+  std::uint64_t gathers_ = 0;  // since the last sorting
+  PassFault fault_;            // of the last pass
 };
 
 extern template class HostEngine<MixedPrecision>;

@@ -2,46 +2,15 @@
 // tiles, blocks and halo then follow from the particles' nodes and order alone, and no lane holds anything besides.
 #include <algorithm>
 #include <cstring>
-#include <string>
 #include <utility>
 
 #include "breccia/error.hpp"
 #include "grid/host_engine.hpp"
+#include "grid/state_columns.hpp"
 #include "mpi/together.hpp"
 
 namespace breccia::grid {
 namespace {
-
-// Nodes are saved as global ones, of the flaws only how many grow: the rest follows from their thresholds.
-bool saved_as_it_is(const FieldDescriptor& field) {
-  const std::string name = field.name;
-  return name != "node" && name != "flaw_first" && name != "flaw_count" && name != "next_threshold";
-}
-
-constexpr const char* kActiveFlaws = "flaws_active";
-
-StateColumn column_for(const FieldDescriptor& field, std::size_t particles) {
-  StateColumn column{field.name,
-                     field.unit,
-                     field.meaning,
-                     static_cast<std::size_t>(field.element_bytes),
-                     static_cast<std::size_t>(field.components),
-                     {}};
-  column.values.resize(particles * column.element_bytes * column.components);
-  return column;
-}
-
-const StateColumn& find_column(const EngineState& state, const std::string& name, std::size_t element_bytes,
-                               std::size_t components) {
-  const auto found = std::find_if(state.columns.begin(), state.columns.end(),
-                                  [&](const StateColumn& column) { return column.name == name; });
-  if (found == state.columns.end()) throw IoError("the checkpoint has no field " + name);
-  if (found->element_bytes != element_bytes || found->components != components ||
-      found->values.size() != state.particles * element_bytes * components) {
-    throw IoError("the checkpoint's field " + name + " has another size than this run needs");
-  }
-  return *found;
-}
 
 void require_slabs(const EngineState& state, int ranks) {
   const bool cut_for_all = !state.same_ranks || state.slab_cuts.size() + 1 == static_cast<std::size_t>(ranks);
@@ -91,6 +60,22 @@ void HostEngine<P>::save_flaws(std::span<const Placement> placements, EngineStat
     active.values.insert(active.values.end(), bytes, bytes + sizeof growing);
   }
   state.columns.push_back(std::move(active));
+}
+
+template <class P>
+material::FlawLists HostEngine<P>::flaws() const {
+  material::FlawLists lists;
+  lists.first.push_back(0);
+  for_each_particle([&](std::size_t slot, BlockCoord) {
+    if (store_.has(Group::kFlaws)) {
+      const Flaws<P>& f = store_.flaws[slot / kLanes];
+      const int lane = static_cast<int>(slot % kLanes);
+      const auto own = flaw_thresholds_.begin() + f.first[lane];
+      lists.threshold.insert(lists.threshold.end(), own, own + (f.count[lane] >> 16));
+    }
+    lists.first.push_back(static_cast<std::uint32_t>(lists.threshold.size()));
+  });
+  return lists;
 }
 
 template <class P>

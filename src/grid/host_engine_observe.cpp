@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "grid/host_engine.hpp"
+#include "grid/observation.hpp"
 
 namespace breccia::grid {
 
@@ -66,40 +67,32 @@ ParticleOutput HostEngine<P>::inspect() const {
 
 template <class P>
 ParticleOutput HostEngine<P>::read_particles(const GridView& grid) const {
-  const material::RuntimeEffects& fx = setup_.effects;
-  const double cell_volume = setup_.cell * setup_.cell * setup_.cell;
   ParticleOutput out;
   for_each_particle([&](std::size_t slot, BlockCoord block) {
     const std::size_t pack = slot / kLanes;
     const int lane = static_cast<int>(slot % kLanes);
     const Kinematics<P>& k = store_.kinematics[pack];
-    const MaterialParameters& parameters = setup_.materials[material(slot)];
-    const double ratio = 1.0 + static_cast<double>(store_.volume[pack].change.value()[lane]);
-    const auto mean = [&](int axis) {
+    ObservedParticle particle{.id = id(slot),
+                              .position = position(slot, block),
+                              .mass = static_cast<double>(k.mass[lane]),
+                              .node_mass = grid.node_mass.empty() ? 0.0 : static_cast<double>(grid.node_mass[slot]),
+                              .body_material = static_cast<std::uint32_t>(store_.identity[pack].body_material[lane]),
+                              .volume_change = static_cast<double>(store_.volume[pack].change.value()[lane]),
+                              .kirchhoff_pressure = static_cast<double>(store_.volume[pack].kirchhoff_pressure[lane])};
+    double* mean[3] = {&particle.velocity.x, &particle.velocity.y, &particle.velocity.z};
+    for (std::size_t axis = 0; axis < 3; ++axis) {
       const auto old = static_cast<double>(k.velocity[axis][lane]);
-      if (grid.new_velocity.empty()) return old;
-      return 0.5 * (old + static_cast<double>(grid.new_velocity[3 * slot + static_cast<std::size_t>(axis)]));
-    };
-    out.id.push_back(id(slot));
-    out.position.push_back(position(slot, block));
-    out.velocity.push_back({mean(0), mean(1), mean(2)});
-    out.mass.push_back(static_cast<double>(k.mass[lane]));
-    out.body.push_back(static_cast<std::uint32_t>(store_.identity[pack].body_material[lane]) & 0xffffU);
-    out.material.push_back(material(slot));
-    out.density.push_back(parameters.eos.rho0 / ratio);
-    if (!grid.node_mass.empty()) out.grid_density.push_back(static_cast<double>(grid.node_mass[slot]) / cell_volume);
-    out.pressure.push_back(static_cast<double>(store_.volume[pack].kirchhoff_pressure[lane]) / ratio);
-    double damage = fx.fully_damaged ? 1.0 : 0.0;
+      const auto now = grid.new_velocity.empty() ? old : static_cast<double>(grid.new_velocity[3 * slot + axis]);
+      *mean[axis] = 0.5 * (old + now);
+    }
     if (store_.has(Group::kDamageLevel)) {
-      const auto root = static_cast<double>(store_.damage_level[pack].root[lane]);
-      damage = root * root * root;
+      particle.damage_root = static_cast<double>(store_.damage_level[pack].root[lane]);
     }
-    out.damage.push_back(damage);
-    if (fx.energy) out.internal_energy.push_back(static_cast<double>(store_.energy[pack].specific.value()[lane]));
-    if (fx.shear) {
-      out.shear_stress.push_back(2.0 * parameters.shear_modulus * hencky_norm(slot) / (std::sqrt(2.0) * ratio));
-    }
+    if (setup_.effects.energy) particle.energy = static_cast<double>(store_.energy[pack].specific.value()[lane]);
+    if (setup_.effects.shear) particle.hencky_norm = hencky_norm(slot);
+    append(out, particle, setup_);
   });
+  if (grid.node_mass.empty()) out.grid_density.clear();
   return out;
 }
 
@@ -110,8 +103,7 @@ double HostEngine<P>::hencky_norm(std::size_t slot) const {
   const Dev3<double> strain{static_cast<double>(e[0][lane]), static_cast<double>(e[1][lane]),
                             static_cast<double>(e[2][lane]), static_cast<double>(e[3][lane]),
                             static_cast<double>(e[4][lane])};
-  const auto powers = material::traceless_powers(strain);
-  return 0.5 * std::sqrt(material::squared_norm(material::deviatoric_log(strain, powers)));
+  return grid::hencky_norm(strain);
 }
 
 template <class P>

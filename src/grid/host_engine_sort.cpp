@@ -81,6 +81,8 @@ void HostEngine<P>::settle_in_slabs(std::vector<Placement> placements) {
   connect_tiles();
   connect_halo();
   plan_sweep();
+  report_ = {};
+  gathers_ = 0;
 }
 
 template <class P>

@@ -144,8 +144,12 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
       for (const SweepTask& task : phase) run_task(task, arguments, trailing, reports);
     }
   }
-  report_ = {};
-  if (fault_.slot != PassFault::kNone) report_fault();
+  report_.largest_move = 0.0;
+  if (fault_.slot != PassFault::kNone && !report_.fault) {
+    report_fault();
+    report_.fault_step = gathers_;
+  }
+  gathers_ += arguments.gather ? 1 : 0;
   const auto book = [&](const TileReport& r) {
     report_.plastic_work += r.plastic_work;
     report_.viscous_work += r.viscous_work;

@@ -4,15 +4,12 @@
 
 #include <cstdint>
 
+#include "grid/layout.hpp"
 #include "grid/particles.hpp"
 #include "material/constitutive.hpp"
 
 namespace breccia::grid {
 
-inline constexpr int kBlockWidth = 4;  ///< nodes along an edge of a block
-inline constexpr int kBlockNodes = 64;
-inline constexpr int kTileMargin = 2;  ///< stencil (1) and drift between two sortings (1)
-inline constexpr int kTileWidth = kBlockWidth + 2 * kTileMargin;
 /// Nodes from one plane x = const of a tile to the next: two more than it holds, since rows that lie 4096 bytes apart
 /// make loads wait for stores they have nothing to do with.
 inline constexpr int kTilePlane = kTileWidth * kTileWidth + 2;
@@ -20,8 +17,6 @@ inline constexpr int kTileNodes = kTileWidth * kTilePlane;
 
 /// Index of a node in a tile, coordinates 0 .. 7.
 constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTileWidth + z; }
-inline constexpr int kNodeBias = 8;  ///< keeps the 8-bit tile coordinates positive
-inline constexpr std::uint32_t kNoBlock = 0xffffffffU;
 
 /// Which rows along z of a block hold something: bit 4 x + y of half 0 for x = 0, 1, and 4 (x - 2) + y of half 1. Tiles
 /// on both sides of a block may mark it at the same time, each its own half.

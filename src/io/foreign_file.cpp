@@ -20,6 +20,8 @@ namespace breccia::io {
 
 namespace {
 
+using Reader = std::function<void(const std::filesystem::path&)>;
+
 constexpr hsize_t kBlock = hsize_t{1} << 20;  // elements that the child reads at once
 // A damaged file can send HDF5 in circles. Whole ones are read at 100 MB/s and more.
 constexpr unsigned kLeastSeconds = 20;
@@ -81,8 +83,8 @@ void read_everything(const std::filesystem::path& path) {
   if (file >= 0) H5Ovisit(file, H5_INDEX_NAME, H5_ITER_NATIVE, read_object, nullptr);
 }
 
-// In the child. MPI is not touched there, and no handler of the parent runs.
-[[noreturn]] void child(const std::filesystem::path& path, unsigned seconds) {
+// In the child. MPI is not touched there, no handler of the parent runs, and no exception comes out.
+[[noreturn]] void child(const std::filesystem::path& path, const Reader& reader, unsigned seconds) noexcept {
   for (const int signal : {SIGSEGV, SIGBUS, SIGABRT, SIGFPE, SIGILL, SIGALRM}) std::signal(signal, SIG_DFL);
   const rlimit no_core{0, 0};
   setrlimit(RLIMIT_CORE, &no_core);
@@ -90,14 +92,14 @@ void read_everything(const std::filesystem::path& path) {
   std::fclose(stderr);
   ::close(STDERR_FILENO);
   alarm(seconds);
-  read_everything(path);
+  reader(path);
   _exit(0);
 }
 
-int status_of_child(const std::filesystem::path& path, unsigned seconds) {
+int status_of_child(const std::filesystem::path& path, const Reader& reader, unsigned seconds) {
   const pid_t pid = fork();
   if (pid < 0) throw IoError(fmt::format("{}: no child process to read it: {}", path.string(), std::strerror(errno)));
-  if (pid == 0) child(path, seconds);
+  if (pid == 0) child(path, reader, seconds);
   int status = 0;
   while (waitpid(pid, &status, 0) < 0) {
     if (errno != EINTR) throw IoError(fmt::format("{}: {}", path.string(), std::strerror(errno)));
@@ -108,16 +110,20 @@ int status_of_child(const std::filesystem::path& path, unsigned seconds) {
 }  // namespace
 
 void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm) {
+  std::error_code unknown;
+  const std::uintmax_t bytes = std::filesystem::file_size(path, unknown);
+  const std::uintmax_t seconds = unknown ? 0 : bytes / kBytesPerSecond;
+  require_harmless(path, comm, read_everything, kLeastSeconds + static_cast<unsigned>(seconds));
+}
+
+void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm, const Reader& reader,
+                      unsigned seconds) {
   on_root(comm, [&] {
-    std::error_code unknown;
-    const std::uintmax_t bytes = std::filesystem::file_size(path, unknown);
-    if (unknown) return;
-    const int status = status_of_child(path, kLeastSeconds + static_cast<unsigned>(bytes / kBytesPerSecond));
-    if (!WIFSIGNALED(status)) return;
-    const int signal = WTERMSIG(status);
-    throw IoError(fmt::format("{}: the file is damaged: {}", path.string(),
-                              signal == SIGALRM ? "reading it does not come to an end"
-                                                : fmt::format("reading it crashes HDF5 (signal {})", signal)));
+    const int status = status_of_child(path, reader, seconds);
+    if (status == 0) return;
+    const bool endless = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM;
+    throw IoError(fmt::format("{}: the file is damaged: reading it {}", path.string(),
+                              endless ? "does not come to an end" : "crashes HDF5"));
   });
 }
 

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 
 #include "mpi/comm.hpp"
 
@@ -10,5 +11,9 @@ namespace breccia::io {
 /// Reads all of the HDF5 file `path` in a child process of the root first. Throws IoError if that crashes or does not
 /// come to an end; the same on all ranks. What is merely not as expected is left to the reader. Collective.
 void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm);
+
+/// The same with another reader in the child, which gets `seconds` for it.
+void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm,
+                      const std::function<void(const std::filesystem::path&)>& reader, unsigned seconds);
 
 }  // namespace breccia::io

@@ -174,8 +174,7 @@ class Output {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
-void print_profile(const StageTimers& timers, const std::string& decision, const nlohmann::json& gravity,
-                   double wall) {
+void print_profile(const StageTimers& timers, const std::string& decision, const nlohmann::json& gravity, double wall) {
   fmt::print("{:<20} {:>10} {:>7} {:>10}\n", "stage", "seconds", "%", "calls");
   for (const StageTimers::Stage& s : timers.stages()) {
     fmt::print("{:<20} {:>10.3f} {:>7.1f} {:>10}\n", s.name, s.seconds, 100.0 * s.seconds / wall, s.calls);
@@ -206,14 +205,19 @@ bool finished(const std::filesystem::path& folder, double end, const RunOptions&
 }
 
 std::unique_ptr<TimeLoop> make_loop(const Scene& scene, const std::optional<Restart>& restart, int threads,
-                                    const mpi::Comm& comm) {
+                                    grid::EngineMaker make, const mpi::Comm& comm) {
   const ResolvedEffects effects = resolve_effects(scene);
-  if (!restart) return std::make_unique<TimeLoop>(scene, effects, threads, comm);
+  if (!restart) return std::make_unique<TimeLoop>(scene, effects, threads, comm, make);
   std::unique_ptr<TimeLoop> loop;
   io::collectively(comm, [&] {
-    loop = std::make_unique<TimeLoop>(scene, effects, restart->engine, restart->run.loop, threads, comm);
+    loop = std::make_unique<TimeLoop>(scene, effects, restart->engine, restart->run.loop, threads, comm, make);
   });
   return loop;
+}
+
+void print_device(const grid::EngineChoice& engine, const mpi::Comm& comm) {
+  if (!comm.is_root() || engine.reason.empty()) return;
+  fmt::print("device: {} ({})\n", engine.device, engine.reason);
 }
 
 // What happens where a window begins: checkpoints, and the end of a run that is told to stop.
@@ -281,6 +285,7 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   RunOptions options = options_in;
   if (options.out.empty()) options.out = default_folder(scene);
   const double end = options.until.value_or(scene.time.end);
+  const grid::EngineChoice engine = grid::choose_engine(options.device, comm);
   std::optional<Restart> restart;
   if (options.restart.empty()) {
     io::prepare_output_folder(options.out, comm);
@@ -294,8 +299,9 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
     restart = find_restart(options.restart, options.out, scene, options.resolved, comm);
   }
 
-  const std::unique_ptr<TimeLoop> owned = make_loop(scene, restart, options.threads, comm);
+  const std::unique_ptr<TimeLoop> owned = make_loop(scene, restart, options.threads, engine.make, comm);
   TimeLoop& loop = *owned;
+  print_device(engine, comm);
   Budget budget(loop.solver(), scene.gravity.uniform, comm, scene.numerics.energy_gain);
   if (restart) budget.restore(restart->run.budget);
   Output output(scene, options, end, restart, budget, comm);
@@ -330,6 +336,7 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   summary.simulated_time = loop.time();
   summary.ranks = comm.size();
   summary.threads = options.threads;
+  summary.device = engine.device;
   summary.precision = scene.numerics.precision == Precision::kDouble ? "double" : "mixed";
   summary.conservation = budget.drift();
   summary.damaged_fraction = output.last_row().damaged_fraction;

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "breccia/scene.hpp"
+#include "grid/device.hpp"
 #include "mpi/comm.hpp"
 
 namespace breccia::sim {
@@ -20,8 +21,9 @@ struct RunOptions {
   std::string restart;                 ///< "auto" or a checkpoint to continue from; empty: a new run
   std::optional<double> walltime;      ///< ends with a checkpoint before this much wall time is over [s]
   int threads = 1;                     ///< OpenMP threads of each rank
-  bool profile = false;                ///< prints the stage timers at the end
-  std::vector<ResolvedKey> resolved;   ///< for summary.json
+  grid::Device device = grid::Device::kAuto;
+  bool profile = false;               ///< prints the stage timers at the end
+  std::vector<ResolvedKey> resolved;  ///< for summary.json
 };
 
 /// Runs `scene` on all ranks of `comm` and writes snapshots, diagnostics.csv and summary.json into the output folder.

@@ -84,14 +84,14 @@ Identities identities_in(const EngineState& state, const Scene& scene) {
 }  // namespace
 
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
-                                                 const mpi::Comm& comm) {
-  return make_loaded_engine(scene, effects, scene::make_particles(scene, comm), threads, comm);
+                                                 const mpi::Comm& comm, grid::EngineMaker make) {
+  return make_loaded_engine(scene, effects, scene::make_particles(scene, comm), threads, comm, make);
 }
 
 namespace {
 
 std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
-                                                const mpi::Comm& comm) {
+                                                const mpi::Comm& comm, grid::EngineMaker make) {
   grid::EngineSetup setup;
   setup.cell = scene.cell;
   setup.materials = scene.materials;
@@ -101,14 +101,15 @@ std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const Resolv
   setup.uniform_gravity = scene.gravity.uniform;
   setup.numerics = scene.numerics;
   setup.threads = threads;
-  return grid::make_engine(setup, comm);
+  return make(setup, comm);
 }
 
 }  // namespace
 
 std::unique_ptr<grid::Engine> make_restored_engine(const Scene& scene, const ResolvedEffects& effects,
-                                                   const EngineState& state, int threads, const mpi::Comm& comm) {
-  auto engine = make_empty_engine(scene, effects, threads, comm);
+                                                   const EngineState& state, int threads, const mpi::Comm& comm,
+                                                   grid::EngineMaker make) {
+  auto engine = make_empty_engine(scene, effects, threads, comm, make);
   Identities particles;
   mpi::together<IoError>(comm, [&] { particles = identities_in(state, scene); });
   const bool grows = effects.material.damage && !state.damage_finished;
@@ -117,8 +118,9 @@ std::unique_ptr<grid::Engine> make_restored_engine(const Scene& scene, const Res
 }
 
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
-                                                 const ParticleArrays& particles, int threads, const mpi::Comm& comm) {
-  auto engine = make_empty_engine(scene, effects, threads, comm);
+                                                 const ParticleArrays& particles, int threads, const mpi::Comm& comm,
+                                                 grid::EngineMaker make) {
+  auto engine = make_empty_engine(scene, effects, threads, comm, make);
   const material::FlawLists flaws =
       effects.material.damage ? draw_all_flaws(scene, {particles.id, particles.body}) : no_flaws(particles.size());
   std::vector<Vec3d> spins;

@@ -13,12 +13,13 @@ double step_at_rest(const Scene& scene, const ResolvedEffects& effects) {
 
 }  // namespace
 
-TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm)
+TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm,
+                   grid::EngineMaker make)
     : scene_(scene),
       viscosity_(effects.material.viscosity),
       adaptive_(!scene.time.step),
       comm_(comm),
-      engine_(make_loaded_engine(scene, effects, threads, comm)),
+      engine_(make_loaded_engine(scene, effects, threads, comm, make)),
       window_(scene.gravity.interval),
       guard_(scene, step_at_rest(scene, effects), comm) {
   const grid::SignalSpeeds speeds = engine_->signal_speeds();
@@ -28,16 +29,15 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
   if (solver_) evaluate_gravity();
   engine_->kick_velocities(0.5 * dt_);
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * dt_); });
-  guard_.note(engine_->last_pass(), step_, time_);
 }
 
 TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const EngineState& engine,
-                   const LoopState& state, int threads, const mpi::Comm& comm)
+                   const LoopState& state, int threads, const mpi::Comm& comm, grid::EngineMaker make)
     : scene_(scene),
       viscosity_(effects.material.viscosity),
       adaptive_(!scene.time.step),
       comm_(comm),
-      engine_(make_restored_engine(scene, effects, engine, threads, comm)),
+      engine_(make_restored_engine(scene, effects, engine, threads, comm, make)),
       window_(scene.gravity.interval),
       guard_(scene, step_at_rest(scene, effects), comm),
       time_(state.time),
@@ -57,7 +57,6 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const Eng
     }
   }
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
-  book_pass();
 }
 
 void TimeLoop::make_solver(const ResolvedEffects& effects, int threads) {
@@ -77,7 +76,7 @@ void TimeLoop::run(const Visit& at_time_step, const Visit& at_window_start) {
   for (;;) {
     // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
     timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
-    if (!at_time_step(*this)) return guard_.check(*engine_);
+    if (!at_time_step(*this)) return check();
     if (!one_step(at_window_start)) return;
   }
 }
@@ -86,14 +85,11 @@ bool TimeLoop::one_step(const Visit& at_window_start) {
   window_.advance();
   if (window_.due() || sorting_due()) {
     timers_("g2p", [&] { engine_->gather(dt_); });
-    book_pass();
     between_steps();
     if (window_.due() && !at_window_start(*this)) return false;
     timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
-    book_pass();
   } else {
     timers_("g2p, stress, p2g", [&] { engine_->gather_scatter(dt_); });
-    book_pass();
     count_step();
   }
   return true;
@@ -109,9 +105,11 @@ void TimeLoop::count_step() {
 
 void TimeLoop::between_steps() {
   count_step();
+  check();
+  const grid::PassReport passes = engine_->passes();
   steps_since_sort_ = 0;
-  guard_.check(*engine_);
-  const double largest_move = comm_.max(engine_->last_pass().largest_move);
+  lost_ = lost_work();
+  const double largest_move = comm_.max(passes.largest_move);
   timers_("damage", [&] { engine_->finish_damage(); });
   timers_("sort", [&] { engine_->sort(); });
   if (window_.due()) begin_window();
@@ -142,11 +140,16 @@ void TimeLoop::evaluate_gravity() {
   gravity_record_.add(solver_->last());
 }
 
-void TimeLoop::book_pass() {
-  guard_.note(engine_->last_pass(), step_, time_);
-  lost_.plastic += engine_->last_pass().plastic_work;
-  lost_.viscous += engine_->last_pass().viscous_work;
-  lost_.clamped += engine_->last_pass().clamped;
+void TimeLoop::check() {
+  const grid::PassReport passes = engine_->passes();
+  const auto steps_after = static_cast<std::uint64_t>(steps_since_sort_) - passes.fault_step;
+  guard_.note(passes, step_ - steps_after, time_ - static_cast<double>(steps_after) * previous_dt_);
+  guard_.check(*engine_);
+}
+
+LostWork TimeLoop::lost_work() const {
+  const grid::PassReport passes = engine_->passes();
+  return {lost_.plastic + passes.plastic_work, lost_.viscous + passes.viscous_work, lost_.clamped + passes.clamped};
 }
 
 void TimeLoop::set_sort_interval(double cells_per_step) {

@@ -21,11 +21,12 @@ class TimeLoop {
   using Visit = std::function<bool(const TimeLoop&)>;
 
   /// Makes the engine with its particles, evaluates gravity, sets v^{-1/2} and scatters for the first time. Collective.
-  TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm);
+  TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm,
+           grid::EngineMaker make = &grid::make_host_engine);
 
   /// Goes on from a state that engine().save() and state() gave, without anything being computed anew. Collective.
   TimeLoop(const Scene& scene, const ResolvedEffects& effects, const EngineState& engine, const LoopState& state,
-           int threads, const mpi::Comm& comm);
+           int threads, const mpi::Comm& comm, grid::EngineMaker make = &grid::make_host_engine);
 
   /// Steps until `at_time_step` returns false; it is called at every t_n, when the grid holds v^{n-1/2} and v^{n+1/2}
   /// and observe() is meaningful. Collective.
@@ -43,7 +44,7 @@ class TimeLoop {
   [[nodiscard]] double dt() const { return dt_; }
   [[nodiscard]] const grid::Engine& engine() const { return *engine_; }
   [[nodiscard]] gravity::Solver* solver() const { return solver_.get(); }
-  [[nodiscard]] const LostWork& lost_work() const { return lost_; }
+  [[nodiscard]] LostWork lost_work() const;
   [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
   [[nodiscard]] const Guard& guard() const { return guard_; }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
@@ -53,9 +54,9 @@ class TimeLoop {
   void make_solver(const ResolvedEffects& effects, int threads);
   void count_step();
   void between_steps();
+  void check();  // of the guard
   void begin_window();
   void evaluate_gravity();
-  void book_pass();
   [[nodiscard]] bool sorting_due() const { return steps_since_sort_ + 1 >= sort_interval_; }
   void set_sort_interval(double cells_per_step);
 
@@ -68,7 +69,7 @@ class TimeLoop {
   gravity::Window window_;
   GravityRecord gravity_record_;
   Guard guard_;
-  LostWork lost_;
+  LostWork lost_;  // up to the last sorting
   double time_ = 0.0;
   double dt_ = 0.0;           // of the step that comes
   double previous_dt_ = 0.0;  // of the step that was

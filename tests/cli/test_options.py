@@ -29,12 +29,6 @@ class Options(CommandTest):
         self.assert_fails(breccia("fly", ranks=2), 2, "fly")
         self.assert_fails(breccia("run", "scene.toml", "--until", "3 km", ranks=2, cwd=self.folder), 2, "--until")
 
-    def test_cuda_is_refused(self):
-        scene = self.write_scene()
-        for ranks in (1, 2):
-            process = breccia("run", scene, "--device", "cuda", ranks=ranks, cwd=self.folder)
-            self.assert_fails(process, 2, "only the host engine")
-
     def test_help_names_every_command(self):
         for ranks in (1, 2):
             process = breccia("--help", ranks=ranks)

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "breccia/error.hpp"
+#include "gravity/mesh/box_mesh.hpp"
 #include "gravity/mesh/boxes.hpp"
 #include "gravity/mesh/clusters.hpp"
 #include "gravity/mesh/convolution.hpp"
@@ -145,6 +146,43 @@ TEST(Clusters, HoldEveryParticleOnceAtItsPlace) {
       EXPECT_LE(std::abs(a.offset[axis][slot]), a.half[axis][cluster]);
       EXPECT_NEAR(static_cast<double>(a.centre[axis][cluster]) + static_cast<double>(a.offset[axis][slot]),
                   coordinates[axis], 4e-6);
+    }
+  }
+}
+
+// The long-range field at the particles must not hang on which ranks transform the mesh: each for itself, all together,
+// only some, or one.
+TEST(BoxMesh, AnySharingGivesTheSameField) {
+  const mpi::Comm comm;
+  const MeshSize size{{27, 27, 27}, {48, 48, 48}};
+  std::mt19937_64 random(19);
+  std::uniform_real_distribution<double> unit(5.0, 21.0);
+  std::vector<Vec3d> position;
+  std::vector<double> mass;
+  for (int i = 0; i < 600; ++i) {
+    const Vec3d x{unit(random), unit(random), unit(random)};
+    // The last rank has none.
+    if (i % std::max(1, comm.size() - 1) != comm.rank()) continue;
+    position.push_back(x);
+    mass.push_back(1.0);
+  }
+  Clusters<double> clusters;
+  clusters.build(position, mass, 2.0, 1);
+  const auto field_of = [&](const MeshSharing& sharing) {
+    SlotField<double> field;
+    for (auto& component : field) component.assign(static_cast<std::size_t>(clusters.count() * kClusterSize), 0.0);
+    Phases phases;
+    BoxMesh<double>(size, {0.8, 3.6, 0.1}, comm, 1, sharing).add_field(clusters, field, phases);
+    return field;
+  };
+  const SlotField<double> replicated = field_of({.replicated_nodes = 1e9});
+  for (const int least_planes : {1, 12, 100}) {
+    const SlotField<double> shared = field_of({.replicated_nodes = 0.0, .least_planes = least_planes});
+    for (std::size_t c = 0; c < 4; ++c) {
+      for (std::size_t i = 0; i < shared[c].size(); ++i) {
+        // Potentials are a few hundred masses over cell; rounded in transforms of 1e5 points.
+        ASSERT_NEAR(shared[c][i], replicated[c][i], 1e-10) << least_planes;
+      }
     }
   }
 }

@@ -45,8 +45,7 @@ Cloud state(char name) {
     // The part in a long ellipsoid of a lattice as dense as that of the others.
     Cloud whole;
     add_rock(whole, 8 * kBody, {}, 2.0 * kRadius, random);
-    for (std::size_t i = 0; i < whole.position.size(); ++i) {
-      const Vec3d x = whole.position[i];
+    for (const Vec3d& x : whole.position) {
       if (0.25 * x.x * x.x + 2.0 * (x.y * x.y + x.z * x.z) > kRadius * kRadius) continue;
       cloud.position.push_back(x);
       cloud.mass.push_back(3e13);

@@ -289,7 +289,7 @@ TEST(TreePm, AnyDistributionGivesTheSameField) {
   }
 }
 
-// A mesh of more doubled nodes than every rank transforms for itself (BoxMesh::kReplicatedNodes).
+// A mesh of more doubled nodes than every rank transforms for itself (MeshSharing).
 TEST(TreePm, LargeMeshesAreSharedByTheRanks) {
   const mpi::Comm comm;
   const Cloud cloud = two_bodies(12000);

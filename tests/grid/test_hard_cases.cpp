@@ -40,7 +40,7 @@ ParticleArrays particles_at(const std::vector<Vec3d>& x, const std::vector<Vec3d
 
 std::unique_ptr<Engine> engine_with(const EngineSetup& setup, const std::vector<Vec3d>& x, const std::vector<Vec3d>& v,
                                     const mpi::Comm& comm) {
-  auto engine = make_engine(setup, comm);
+  auto engine = make_host_engine(setup, comm);
   const ParticleArrays p = particles_at(x, v, comm);
   material::FlawLists none;
   none.first.assign(p.size() + 1, 0U);

@@ -94,7 +94,7 @@ EngineSetup setup_for(const Scene& scene, const material::RuntimeEffects& effect
 // `fused`: gather and scatter in one sweep, with a sorting every 10 steps; otherwise every step in two halves.
 ParticleOutput run_engine(const Scene& scene, const material::RuntimeEffects& effects, double dt, bool fused,
                           int threads, const mpi::Comm& comm) {
-  const auto engine = make_engine(setup_for(scene, effects, threads), comm);
+  const auto engine = make_host_engine(setup_for(scene, effects, threads), comm);
   const ParticleArrays mine = share(all_particles(scene), comm);
   const Vec3d spins[2] = {scene.bodies[0].spin, scene.bodies[1].spin};
   engine->insert(mine, flaws_of(scene, mine), spins);
@@ -185,7 +185,7 @@ TEST(EngineAgainstReference, HalvesEqualTheFusedSweep) {
 // rounding is larger than in the impact by no more than a factor of ten.
 TEST(EngineAgainstReference, LoneParticlesMoveAsOnTheGrid) {
   const Scene scene = debris(Precision::kDouble);
-  const auto engine = make_engine(setup_for(scene, kRock, 1), mpi::Comm(MPI_COMM_SELF));
+  const auto engine = make_host_engine(setup_for(scene, kRock, 1), mpi::Comm(MPI_COMM_SELF));
   const ParticleArrays all = all_particles(scene);
   const Vec3d spins[2] = {scene.bodies[0].spin, scene.bodies[1].spin};
   engine->insert(all, flaws_of(scene, all), spins);

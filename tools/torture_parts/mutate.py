@@ -1,8 +1,10 @@
-"""Checkpoint files with damage of all kinds: each must be refused with exit code 4, or continued to the results of the
-intact one where the damage is outside of what is read. Never a crash, a hang, or other results."""
+"""Files with damage of all kinds. A checkpoint must be refused with exit code 4, or continued to the results of the intact
+one where the damage is outside of what is read: never a crash, a hang, or other results. A snapshot, which has no
+checksum, must be analysed or refused with an error of one line: never a crash or a hang."""
 
 import random
 import shutil
+import subprocess
 
 from torture_parts import runs
 
@@ -47,6 +49,33 @@ def mutated(intact, source):
     return bytes(data), f"{kind} at {at}, length {length}"
 
 
+def analyse_damaged(root, folder, intact, count, source):
+    """Findings among `count` damaged copies of the snapshot `intact`."""
+    path = folder / "damaged.hdf"
+    findings = 0
+    for number in range(count):
+        data, what = mutated(intact, source)
+        path.write_bytes(data)
+        try:
+            process = subprocess.run(
+                [root / "build" / "release" / "breccia", "analyze", path],
+                capture_output=True,
+                text=True,
+                timeout=120,
+                check=False,
+            )
+            code, errors = process.returncode, process.stderr
+        except subprocess.TimeoutExpired:
+            code, errors = None, "does not end"
+        if code == 0 or (code in (2, 3, 4) and errors.count("error: ") == 1):
+            continue
+        findings += 1
+        kept = folder / f"finding{number}.hdf"
+        kept.write_bytes(data)
+        print(f"{kept}: {what}: exit code {code}: {errors.strip()[-300:]}", flush=True)
+    return findings
+
+
 def run(root, options):
     count = 50 if options.quick else getattr(options, "count", 1000)
     source = random.Random(getattr(options, "seed", 1))
@@ -84,4 +113,8 @@ def run(root, options):
             kept = folder / f"finding{number}.h5"
             kept.write_bytes(data)
             print(f"{kept}: {what}: exit code {code}: {errors.strip()}", flush=True)
-    return f"{count} damaged checkpoints of {len(intact)} bytes, {refused} refused, {harmless} harmless", findings
+    snapshots = count // 5
+    snapshot = (folder / "first" / "snap_0000.hdf").read_bytes()
+    findings += analyse_damaged(root, folder, snapshot, snapshots, source)
+    checkpoints = f"{count} damaged checkpoints of {len(intact)} bytes, {refused} refused, {harmless} harmless"
+    return f"{checkpoints}; {snapshots} damaged snapshots", findings

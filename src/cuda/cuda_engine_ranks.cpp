@@ -1,0 +1,130 @@
+// Particles that leave the planes of this rank, with their flaws, at a sorting.
+#include <algorithm>
+#include <cstring>
+#include <utility>
+
+#include "cuda/cuda_engine.hpp"
+
+namespace breccia::cuda {
+namespace {
+
+// Reads and writes plain values in a message.
+template <class T>
+void put(std::vector<std::byte>& message, const T* values, std::size_t count) {
+  const auto* bytes = reinterpret_cast<const std::byte*>(values);
+  message.insert(message.end(), bytes, bytes + count * sizeof(T));
+}
+template <class T>
+void get(const std::byte*& from, T* values, std::size_t count) {
+  std::memcpy(values, from, count * sizeof(T));
+  from += count * sizeof(T);
+}
+
+}  // namespace
+
+template <class P>
+OwnPlanes CudaEngine<P>::own_planes() const {
+  OwnPlanes planes{.axis = slabs_.axis()};
+  const auto rank = static_cast<std::size_t>(comm_.rank());
+  if (rank > 0) planes.low = slabs_.cuts()[rank - 1];
+  if (rank < slabs_.cuts().size()) planes.high = slabs_.cuts()[rank];
+  return planes;
+}
+
+template <class P>
+void CudaEngine<P>::migrate() {
+  if (comm_.size() == 1) return;
+  unsigned too_far = 0;
+  grid_.place(particles_, too_far, stream_);
+  if (comm_.any(too_far != 0)) throw NumericsError(kTooFar);
+  const auto mine = static_cast<std::uint64_t>(particles_.count());
+  // Counts, not clocks: a run repeats bit for bit.
+  constexpr double allowed = 1.2;
+  if (static_cast<double>(comm_.max(mine)) > allowed * static_cast<double>(comm_.sum(mine)) / comm_.size()) cut_anew();
+
+  const std::vector<grid::BlockKey> keys = grid_.block_keys_of_particles(stream_);
+  std::vector<std::vector<unsigned>> leaving(static_cast<std::size_t>(comm_.size()));
+  std::vector<unsigned> staying;
+  std::vector<grid::BlockKey> staying_keys;
+  for (unsigned slot = 0; slot < keys.size(); ++slot) {
+    const int rank = slabs_.owner(grid::component(grid::block_coord(keys[slot]), slabs_.axis()));
+    if (rank == comm_.rank()) {
+      staying.push_back(slot);
+      staying_keys.push_back(keys[slot]);
+    } else {
+      leaving[static_cast<std::size_t>(rank)].push_back(slot);
+    }
+  }
+  if (!comm_.any(staying.size() != keys.size())) return;
+  take(staying, std::move(staying_keys), comm_.alltoall(messages_of(leaving, keys)));
+}
+
+template <class P>
+std::vector<std::vector<std::byte>> CudaEngine<P>::messages_of(const std::vector<std::vector<unsigned>>& leaving,
+                                                               std::span<const grid::BlockKey> keys) {
+  const std::size_t record = particles_.record_bytes();
+  const std::size_t first_at = particles_.place_in_record("flaw_first");
+  const std::size_t count_at = particles_.place_in_record("flaw_count");
+  std::vector<std::vector<std::byte>> messages(leaving.size());
+  for (std::size_t rank = 0; rank < leaving.size(); ++rank) {
+    const std::vector<std::byte> records = particles_.extract(leaving[rank], stream_);
+    for (std::size_t i = 0; i < leaving[rank].size(); ++i) {
+      const std::byte* own = records.data() + i * record;
+      put(messages[rank], &keys[leaving[rank][i]], 1);
+      put(messages[rank], own, record);
+      if (!particles_.groups().flaws) continue;
+      std::int32_t first = 0;
+      std::int32_t count = 0;
+      std::memcpy(&first, own + first_at, sizeof first);
+      std::memcpy(&count, own + count_at, sizeof count);
+      put(messages[rank], flaw_thresholds_host_.data() + first, static_cast<std::size_t>(count >> 16));
+    }
+  }
+  return messages;
+}
+
+template <class P>
+void CudaEngine<P>::take(std::span<const unsigned> staying, std::vector<grid::BlockKey> keys,
+                         const std::vector<std::vector<std::byte>>& messages) {
+  const std::size_t record = particles_.record_bytes();
+  const std::size_t first_at = particles_.place_in_record("flaw_first");
+  const std::size_t count_at = particles_.place_in_record("flaw_count");
+  std::vector<std::byte> arrivals;
+  for (const std::vector<std::byte>& message : messages) {
+    const std::byte* from = message.data();
+    const std::byte* const end = from + message.size();
+    while (from != end) {
+      keys.emplace_back();
+      get(from, &keys.back(), 1);
+      arrivals.insert(arrivals.end(), from, from + record);
+      from += record;
+      if (!particles_.groups().flaws) continue;
+      std::byte* own = arrivals.data() + arrivals.size() - record;
+      const auto first = static_cast<std::int32_t>(flaw_thresholds_host_.size());
+      std::int32_t count = 0;
+      std::memcpy(&count, own + count_at, sizeof count);
+      std::memcpy(own + first_at, &first, sizeof first);
+      const auto flaws = static_cast<std::size_t>(count >> 16);
+      flaw_thresholds_host_.resize(flaw_thresholds_host_.size() + flaws);
+      get(from, flaw_thresholds_host_.data() + flaw_thresholds_host_.size() - flaws, flaws);
+    }
+  }
+  particles_.replace(staying, arrivals, stream_);
+  grid_.set_block_keys(keys, stream_);
+  if (particles_.groups().flaws) {
+    flaw_thresholds_.reserve(flaw_thresholds_host_.size());
+    flaw_thresholds_.upload(flaw_thresholds_host_, stream_);
+  }
+}
+
+template <class P>
+void CudaEngine<P>::cut_anew() {
+  EngineState state = save();
+  state.same_ranks = false;
+  restore(state, flaws());
+}
+
+template class CudaEngine<MixedPrecision>;
+template class CudaEngine<DoublePrecision>;
+
+}  // namespace breccia::cuda

@@ -1,0 +1,124 @@
+#include "cuda/halo.hpp"
+
+#include <algorithm>
+#include <unordered_map>
+
+#include "cuda/launchers.hpp"
+
+namespace breccia::cuda {
+namespace {
+
+template <class T>
+void replace(DeviceArray<T>& array, const std::vector<T>& values, cudaStream_t stream) {
+  array.reserve(values.size());
+  array.upload(values, stream);
+}
+
+// Keys of the blocks that each rank may reach as well: particles reach no further than the plane next to their own.
+std::vector<std::vector<grid::BlockKey>> offers(std::span<const grid::BlockKey> blocks,
+                                                const grid::Periodicity& periodicity, const mpi::Slabs& slabs,
+                                                const mpi::Comm& comm) {
+  std::vector<std::vector<grid::BlockKey>> of_rank(static_cast<std::size_t>(comm.size()));
+  for (const grid::BlockKey key : blocks) {
+    const std::int32_t plane = grid::component(grid::block_coord(key), slabs.axis());
+    for (int side = -1; side <= 1; ++side) {
+      const int rank = slabs.owner(periodicity.wrap(plane + side, slabs.axis()));
+      auto& keys = of_rank[static_cast<std::size_t>(rank)];
+      if (rank != comm.rank() && (keys.empty() || keys.back() != key)) keys.push_back(key);
+    }
+  }
+  return of_rank;
+}
+
+}  // namespace
+
+template <class Real>
+void Halo<Real>::set(std::span<const grid::BlockKey> blocks, const grid::Periodicity& periodicity,
+                     const mpi::Slabs& slabs, const mpi::Comm& comm, cudaStream_t stream) {
+  std::unordered_map<grid::BlockKey, unsigned> index;
+  for (unsigned b = 0; b < blocks.size(); ++b) index[blocks[b]] = b;
+  auto offered = comm.alltoall(offers(blocks, periodicity, slabs, comm));
+  peers_.clear();
+  shared_ = 0;
+  std::vector<unsigned> sent;
+  for (std::size_t rank = 0; rank < offered.size(); ++rank) {
+    std::sort(offered[rank].begin(), offered[rank].end());
+    Peer peer{static_cast<int>(rank), {}};
+    for (const grid::BlockKey key : offered[rank]) {
+      const auto found = index.find(key);
+      if (found != index.end()) peer.blocks.push_back(found->second);
+    }
+    if (peer.blocks.empty()) continue;
+    shared_ += peer.blocks.size();
+    sent.insert(sent.end(), peer.blocks.begin(), peer.blocks.end());
+    peers_.push_back(std::move(peer));
+  }
+  replace(sent_blocks_, sent, stream);
+  list_contributions(blocks.size(), comm.rank(), stream);
+  sent_.reserve(shared_ * kBlockValues);
+  received_.reserve(shared_ * kBlockValues);
+  sent_host_.reserve(shared_ * kBlockValues);
+  received_host_.reserve(shared_ * kBlockValues);
+}
+
+template <class Real>
+void Halo<Real>::list_contributions(std::size_t blocks, int own_rank, cudaStream_t stream) {
+  std::vector<unsigned> list_of_block(blocks, grid::kNoBlock);
+  std::vector<std::vector<unsigned>> places;
+  std::vector<unsigned> lower;
+  unsigned place = 0;
+  for (const Peer& peer : peers_) {
+    for (const unsigned block : peer.blocks) {
+      unsigned& list = list_of_block[block];
+      if (list == grid::kNoBlock) {
+        list = static_cast<unsigned>(places.size());
+        places.emplace_back();
+        lower.push_back(0);
+      }
+      places[list].push_back(place++);
+      if (peer.rank < own_rank) ++lower[list];
+    }
+  }
+  std::vector<unsigned> first{0};
+  std::vector<unsigned> all;
+  for (const auto& of_list : places) {
+    all.insert(all.end(), of_list.begin(), of_list.end());
+    first.push_back(static_cast<unsigned>(all.size()));
+  }
+  replace(list_of_block_, list_of_block, stream);
+  replace(first_, first, stream);
+  replace(lower_, lower, stream);
+  replace(places_, all, stream);
+}
+
+template <class Real>
+void Halo<Real>::exchange(const GridView<Real>& grid, const mpi::Comm& comm, cudaStream_t stream) {
+  if (shared_ == 0) return;
+  const std::size_t bytes = shared_ * kBlockValues * sizeof(Real);
+  launch_collect_shared(grid, sent_blocks_.data(), static_cast<unsigned>(shared_), sent_.data(), stream);
+  check(cudaMemcpyAsync(sent_host_.data(), sent_.data(), bytes, cudaMemcpyDeviceToHost, stream), "halo");
+  check(cudaStreamSynchronize(stream), "halo");
+  std::vector<MPI_Request> requests;
+  std::size_t at = 0;
+  for (const Peer& peer : peers_) {
+    const auto values = static_cast<int>(peer.blocks.size() * kBlockValues);
+    requests.emplace_back();
+    MPI_Irecv(received_host_.data() + at, values, mpi::datatype<Real>(), peer.rank, 2, comm.handle(), &requests.back());
+    requests.emplace_back();
+    MPI_Isend(sent_host_.data() + at, values, mpi::datatype<Real>(), peer.rank, 2, comm.handle(), &requests.back());
+    at += peer.blocks.size() * kBlockValues;
+  }
+  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
+  check(cudaMemcpyAsync(received_.data(), received_host_.data(), bytes, cudaMemcpyHostToDevice, stream), "halo");
+}
+
+template <class Real>
+SharedView<Real> Halo<Real>::view() const {
+  if (shared_ == 0) return {};
+  return {list_of_block_.data(), first_.data(), lower_.data(), places_.data(), received_.data()};
+}
+
+template class Halo<float>;
+template class Halo<double>;
+
+}  // namespace breccia::cuda

@@ -1,0 +1,39 @@
+#include <string>
+
+#include "breccia/error.hpp"
+#include "cuda/cuda_engine.hpp"
+#include "cuda/plugin_interface.hpp"
+
+namespace breccia::cuda {
+namespace {
+
+const char* select_device(int local_rank, std::string& name) {
+  int count = 0;
+  const cudaError_t status = cudaGetDeviceCount(&count);
+  if (status != cudaSuccess) {
+    (void)cudaGetLastError();
+    return cudaGetErrorString(status);
+  }
+  if (count == 0) return "no CUDA device";
+  const int device = local_rank % count;
+  cudaDeviceProp properties{};
+  if (cudaSetDevice(device) != cudaSuccess || cudaGetDeviceProperties(&properties, device) != cudaSuccess) {
+    return "the CUDA device cannot be used";
+  }
+  name = std::string(properties.name) + " (" + std::to_string(device + 1) + " of " + std::to_string(count) + ")";
+  return nullptr;
+}
+
+grid::Engine* make_engine(const grid::EngineSetup& setup, const mpi::Comm& comm) {
+  if (setup.numerics.precision == Precision::kDouble) return new CudaEngine<DoublePrecision>(setup, comm);
+  return new CudaEngine<MixedPrecision>(setup, comm);
+}
+
+constexpr PluginInterface kInterface{BRECCIA_VERSION, &select_device, &make_engine};
+
+}  // namespace
+}  // namespace breccia::cuda
+
+extern "C" __attribute__((visibility("default"))) const breccia::cuda::PluginInterface* breccia_cuda_plugin() {
+  return &breccia::cuda::kInterface;
+}

@@ -1,0 +1,9 @@
+// A file for each precision: they compile at the same time.
+#include "cuda/tile_pass.cuh"
+
+namespace breccia::cuda {
+
+template void prepare_tile_pass<float>();
+template void launch_tile_pass<float>(const PassArguments<float>&, cudaStream_t);
+
+}  // namespace breccia::cuda

@@ -1,0 +1,26 @@
+// Where a run computes. The CUDA engine is a library of its own that is loaded at run time: the program starts and runs
+// without toolkit, driver and device.
+#pragma once
+
+#include <string>
+
+#include "grid/engine.hpp"
+
+namespace breccia::grid {
+
+enum class Device { kAuto, kHost, kCuda };
+
+struct EngineChoice {
+  EngineMaker make;
+  std::string device;  ///< "host" or "cuda"
+  std::string reason;  ///< of a device: its name; of the host: why no CUDA device, empty where none was to be expected
+};
+
+/// The engine to use, the same on all ranks: that of this node's CUDA devices, if every rank can have one, for kAuto
+/// and kCuda. Collective. Throws UsageError if kCuda cannot be had.
+EngineChoice choose_engine(Device wanted, const mpi::Comm& comm);
+
+/// The CUDA device of this process as `breccia info` names it, or why there is none.
+std::string describe_cuda();
+
+}  // namespace breccia::grid

@@ -1,0 +1,37 @@
+#include "grid/state_columns.hpp"
+
+#include <algorithm>
+
+#include "breccia/error.hpp"
+
+namespace breccia::grid {
+
+bool saved_as_it_is(const FieldDescriptor& field) {
+  const std::string name = field.name;
+  return name != "node" && name != "flaw_first" && name != "flaw_count" && name != "next_threshold";
+}
+
+StateColumn column_for(const FieldDescriptor& field, std::size_t particles) {
+  StateColumn column{field.name,
+                     field.unit,
+                     field.meaning,
+                     static_cast<std::size_t>(field.element_bytes),
+                     static_cast<std::size_t>(field.components),
+                     {}};
+  column.values.resize(particles * column.element_bytes * column.components);
+  return column;
+}
+
+const StateColumn& find_column(const EngineState& state, const std::string& name, std::size_t element_bytes,
+                               std::size_t components) {
+  const auto found = std::find_if(state.columns.begin(), state.columns.end(),
+                                  [&](const StateColumn& column) { return column.name == name; });
+  if (found == state.columns.end()) throw IoError("the checkpoint has no field " + name);
+  if (found->element_bytes != element_bytes || found->components != components ||
+      found->values.size() != state.particles * element_bytes * components) {
+    throw IoError("the checkpoint's field " + name + " has another size than this run needs");
+  }
+  return *found;
+}
+
+}  // namespace breccia::grid

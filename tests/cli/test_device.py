@@ -1,0 +1,83 @@
+"""Where a run computes: the CUDA engine is loaded from a library; here one that emulates the device on the CPU."""
+
+import csv
+import json
+import os
+import unittest
+from unittest import mock
+
+from command import CommandTest, breccia
+
+EMULATED = os.environ["BRECCIA_EMULATED_CUDA"]
+
+
+def devices(library, count=1):
+    """The environment of a machine with this library and so many devices."""
+    return mock.patch.dict(os.environ, BRECCIA_CUDA_LIBRARY=str(library), BRECCIA_EMULATED_DEVICES=str(count))
+
+
+class Device(CommandTest):
+    def summary(self, out):
+        return json.loads((self.folder / out / "summary.json").read_text())
+
+    def last_row(self, out):
+        with open(self.folder / out / "diagnostics.csv", newline="", encoding="utf-8") as file:
+            return list(csv.DictReader(file))[-1]
+
+    def run_scene(self, out, *options, ranks=1):
+        return breccia("run", self.write_scene(), "--steps", "40", "--out", out, *options, ranks=ranks, cwd=self.folder)
+
+    def test_without_the_library(self):
+        with devices(self.folder / "none.so"):
+            for ranks in (1, 2):
+                self.assert_fails(self.run_scene("a", "--device", "cuda", ranks=ranks), 2, "has no CUDA engine")
+            process = self.run_scene("b")
+            self.assertEqual((process.returncode, process.stdout), (0, ""))
+            self.assertEqual(self.summary("b")["device"], "host")
+            self.assertIn("has no CUDA engine", breccia("info").stdout)
+
+    def test_without_a_device(self):
+        with devices(EMULATED, 0):
+            self.assert_fails(self.run_scene("a", "--device", "cuda"), 2, "no CUDA-capable device")
+            process = self.run_scene("b")
+            self.assertEqual(process.returncode, 0)
+            self.assertIn("device: host (no CUDA-capable device", process.stdout)
+            self.assertEqual(self.summary("b")["device"], "host")
+
+    def test_library_that_is_none(self):
+        broken = self.folder / "broken.so"
+        broken.write_text("no library")
+        with devices(broken):
+            self.assert_fails(self.run_scene("a", "--device", "cuda"), 2, "broken.so")
+
+    def test_device_gives_what_the_host_gives(self):
+        with devices(EMULATED):
+            process = self.run_scene("cuda")
+            self.assertEqual(process.returncode, 0, process.stderr)
+            self.assertIn("device: cuda (emulated device", process.stdout)
+            self.assertEqual(self.run_scene("host", "--device", "host").stdout, "")
+            self.assertIn("emulated device", breccia("info").stdout)
+        self.assertEqual(self.summary("cuda")["device"], "cuda")
+        self.assertEqual(self.summary("host")["device"], "host")
+        cuda, host = self.last_row("cuda"), self.last_row("host")
+        # Rounding of float positions and velocities, 1e-5 of a quantity; gravity included.
+        for name in ("kinetic_energy [J]", "internal_energy [J]", "mass [kg]"):
+            self.assertAlmostEqual(float(cuda[name]) / float(host[name]), 1.0, delta=1e-5, msg=name)
+
+    def test_a_device_for_each_rank(self):
+        with devices(EMULATED):
+            process = self.run_scene("two", "--device", "cuda", ranks=2)
+            self.assertEqual(process.returncode, 0, process.stderr)
+            self.assertEqual(process.stdout.count("device: cuda (emulated device (1 of 1)"), 1)
+        self.assertEqual((self.summary("two")["device"], self.summary("two")["ranks"]), ("cuda", 2))
+
+    def test_run_continues_on_the_other_device(self):
+        with devices(EMULATED):
+            first = self.run_scene("out", "--walltime", "0", "--device", "cuda")
+            self.assertEqual(first.returncode, 75, first.stderr)
+            second = self.run_scene("out", "--restart", "auto", "--device", "host")
+            self.assertEqual(second.returncode, 0, second.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,203 @@
+#include "tests/cuda/emulation/runtime_api.hpp"
+
+#include <cstdint>
+#include <cstdlib>
+#include <functional>
+#include <map>
+#include <vector>
+
+#include "tests/cuda/emulation/cuda_emulation.hpp"
+
+struct EmulatedGraph {
+  std::vector<std::function<void()>> work;
+};
+struct EmulatedStream {
+  EmulatedGraph* capturing = nullptr;
+};
+
+namespace breccia::cuda_emulation {
+
+void run_kernel(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes, const std::function<void()>& body);
+
+namespace {
+
+constexpr std::size_t kDeviceBytes = std::size_t{2} << 30;
+#if defined(__SANITIZE_ADDRESS__)
+constexpr std::size_t kGuard = 0;  // the sanitizer sees every access beyond the end
+#else
+constexpr std::size_t kGuard = 256;
+#endif
+constexpr unsigned char kFill = 0xff;
+
+struct Memory {
+  std::map<const unsigned char*, std::size_t> allocations;
+  std::size_t used = 0;
+
+  // Whether all of [address, address + bytes) lies in one allocation.
+  [[nodiscard]] bool holds(const void* address, std::size_t bytes) const {
+    const auto* a = static_cast<const unsigned char*>(address);
+    auto next = allocations.upper_bound(a);
+    if (next == allocations.begin()) return false;
+    --next;
+    return a + bytes <= next->first + next->second;
+  }
+};
+Memory& memory() {
+  static Memory the_memory;
+  return the_memory;
+}
+
+std::uint64_t launches = 0;
+std::uint64_t synchronisations = 0;
+
+// Now, or as a part of the graph that the stream captures.
+void enqueue(cudaStream_t stream, std::function<void()> work) {
+  if (stream != nullptr && stream->capturing != nullptr) {
+    stream->capturing->work.push_back(std::move(work));
+  } else {
+    work();
+  }
+}
+
+}  // namespace
+
+std::uint64_t launch_count() { return launches; }
+std::uint64_t synchronisation_count() { return synchronisations; }
+std::size_t live_allocations() { return memory().allocations.size(); }
+
+void launch(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
+            std::function<void()> body) {
+  enqueue(stream, [=, body = std::move(body)] {
+    ++launches;
+    run_kernel(kernel, grid, block, shared_bytes, body);
+  });
+}
+
+}  // namespace breccia::cuda_emulation
+
+using breccia::cuda_emulation::EmulationError;
+using breccia::cuda_emulation::memory;
+
+const char* cudaGetErrorString(cudaError_t error) {
+  switch (error) {
+    case cudaSuccess:
+      return "no error";
+    case cudaErrorInvalidValue:
+      return "invalid argument";
+    case cudaErrorMemoryAllocation:
+      return "out of memory";
+    case cudaErrorInsufficientDriver:
+      return "CUDA driver version is insufficient for CUDA runtime version";
+    case cudaErrorNoDevice:
+      return "no CUDA-capable device is detected";
+  }
+  return "unknown error";
+}
+cudaError_t cudaGetLastError() { return cudaSuccess; }
+cudaError_t cudaGetDeviceCount(int* count) {
+  const char* wanted = std::getenv("BRECCIA_EMULATED_DEVICES");
+  *count = wanted == nullptr ? 1 : std::atoi(wanted);
+  return *count > 0 ? cudaSuccess : cudaErrorNoDevice;
+}
+cudaError_t cudaSetDevice(int) { return cudaSuccess; }
+cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int) {
+  *properties = {"emulated device", breccia::cuda_emulation::kDeviceBytes, 9, 0};
+  return cudaSuccess;
+}
+cudaError_t cudaMemGetInfo(std::size_t* available, std::size_t* total) {
+  *total = breccia::cuda_emulation::kDeviceBytes;
+  *available = *total - memory().used;
+  return cudaSuccess;
+}
+
+cudaError_t cudaMalloc(void** address, std::size_t bytes) {
+  using namespace breccia::cuda_emulation;
+  if (memory().used + bytes > kDeviceBytes) return cudaErrorMemoryAllocation;
+  auto* start = static_cast<unsigned char*>(std::malloc(bytes + 2 * kGuard));
+  if (start == nullptr) return cudaErrorMemoryAllocation;
+  std::memset(start, kFill, bytes + 2 * kGuard);
+  memory().allocations[start + kGuard] = bytes;
+  memory().used += bytes;
+  *address = start + kGuard;
+  return cudaSuccess;
+}
+
+cudaError_t cudaFree(void* address) {
+  using namespace breccia::cuda_emulation;
+  if (address == nullptr) return cudaSuccess;
+  const auto found = memory().allocations.find(static_cast<unsigned char*>(address));
+  if (found == memory().allocations.end()) return cudaErrorInvalidValue;
+  auto* start = static_cast<unsigned char*>(address);
+  const std::size_t bytes = found->second;
+  bool intact = true;
+  for (std::size_t n = 1; n <= kGuard; ++n) intact = intact && *(start - n) == kFill && start[bytes + n - 1] == kFill;
+  memory().used -= bytes;
+  memory().allocations.erase(found);
+  std::free(start - kGuard);
+  if (!intact) throw EmulationError("a kernel wrote outside of an allocation of " + std::to_string(bytes) + " bytes");
+  return cudaSuccess;
+}
+
+cudaError_t cudaMallocHost(void** address, std::size_t bytes) {
+  *address = std::malloc(bytes);
+  return *address != nullptr ? cudaSuccess : cudaErrorMemoryAllocation;
+}
+cudaError_t cudaFreeHost(void* address) {
+  std::free(address);
+  return cudaSuccess;
+}
+
+cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaMemcpyKind kind, cudaStream_t stream) {
+  if (bytes == 0) return cudaSuccess;
+  const bool to_device = kind != cudaMemcpyDeviceToHost;
+  const bool from_device = kind != cudaMemcpyHostToDevice;
+  if (memory().holds(to, bytes) != to_device || memory().holds(from, bytes) != from_device)
+    return cudaErrorInvalidValue;
+  breccia::cuda_emulation::enqueue(stream, [=] { std::memcpy(to, from, bytes); });
+  return cudaSuccess;
+}
+cudaError_t cudaMemsetAsync(void* to, int value, std::size_t bytes, cudaStream_t stream) {
+  if (bytes == 0) return cudaSuccess;
+  if (!memory().holds(to, bytes)) return cudaErrorInvalidValue;
+  breccia::cuda_emulation::enqueue(stream, [=] { std::memset(to, value, bytes); });
+  return cudaSuccess;
+}
+
+cudaError_t cudaStreamCreate(cudaStream_t* stream) {
+  *stream = new EmulatedStream;
+  return cudaSuccess;
+}
+cudaError_t cudaStreamDestroy(cudaStream_t stream) {
+  delete stream;
+  return cudaSuccess;
+}
+cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
+  ++breccia::cuda_emulation::synchronisations;
+  return stream->capturing == nullptr ? cudaSuccess : cudaErrorInvalidValue;
+}
+cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode) {
+  if (stream->capturing != nullptr) return cudaErrorInvalidValue;
+  stream->capturing = new EmulatedGraph;
+  return cudaSuccess;
+}
+cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph) {
+  *graph = stream->capturing;
+  stream->capturing = nullptr;
+  return cudaSuccess;
+}
+cudaError_t cudaGraphInstantiate(cudaGraphExec_t* executable, cudaGraph_t graph, unsigned long long) {
+  *executable = new EmulatedGraph(*graph);
+  return cudaSuccess;
+}
+cudaError_t cudaGraphLaunch(cudaGraphExec_t executable, cudaStream_t) {
+  for (const auto& work : executable->work) work();
+  return cudaSuccess;
+}
+cudaError_t cudaGraphDestroy(cudaGraph_t graph) {
+  delete graph;
+  return cudaSuccess;
+}
+cudaError_t cudaGraphExecDestroy(cudaGraphExec_t executable) {
+  delete executable;
+  return cudaSuccess;
+}

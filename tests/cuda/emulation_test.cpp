@@ -1,0 +1,126 @@
+// The emulation itself: a right kernel is right in any order; each kind of mistake is found.
+#include <gtest/gtest.h>
+
+#include <string>
+
+#include "tests/cuda/faulty_kernels.hpp"
+
+namespace breccia::cuda_test {
+namespace {
+
+using cuda_emulation::EmulationError;
+using cuda_emulation::Order;
+constexpr unsigned kBlocks = 5;
+constexpr int kSum = static_cast<int>(kBlocks) * kThreads * (kThreads - 1) / 2;
+
+template <Fault kFault>
+int run(Order order) {
+  cuda_emulation::set_order(order, 7);
+  cudaStream_t stream = nullptr;
+  EXPECT_EQ(cudaStreamCreate(&stream), cudaSuccess);
+  void* total = nullptr;
+  EXPECT_EQ(cudaMalloc(&total, sizeof(int)), cudaSuccess);
+  EXPECT_EQ(cudaMemsetAsync(total, 0, sizeof(int), stream), cudaSuccess);
+  int result = 0;
+  std::string error;
+  try {
+    BRECCIA_LAUNCH(sum_of_blocks<kFault>, dim3(kBlocks), dim3(kThreads), sizeof(Values), stream,
+                   static_cast<int*>(total));
+    EXPECT_EQ(cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream), cudaSuccess);
+  } catch (const EmulationError& e) {
+    error = e.what();
+  }
+  try {
+    EXPECT_EQ(cudaFree(total), cudaSuccess);
+  } catch (const EmulationError& e) {
+    error = e.what();
+  }
+  cudaStreamDestroy(stream);
+  if (!error.empty()) throw EmulationError(error);
+  return result;
+}
+
+template <Fault kFault>
+std::string error_of(Order order = Order::kRandom) {
+  try {
+    run<kFault>(order);
+  } catch (const EmulationError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+bool says(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
+
+TEST(Emulation, RightKernelGivesTheSameInAnyOrder) {
+  for (const Order order : {Order::kForward, Order::kReverse, Order::kRandom})
+    EXPECT_EQ(run<Fault::kNone>(order), kSum);
+}
+
+TEST(Emulation, MissingBarrierShowsAsUninitialisedMemory) { EXPECT_NE(run<Fault::kNoBarrier>(Order::kForward), kSum); }
+
+TEST(Emulation, FindsThreadsAtDifferentBarriers) {
+  EXPECT_TRUE(says(error_of<Fault::kDivergentBarrier>(), "waits at the barrier of line"));
+}
+
+TEST(Emulation, FindsAThreadThatLeavesBeforeABarrier) {
+  const std::string error = error_of<Fault::kEarlyExit>();
+  EXPECT_TRUE(says(error, "thread 5: left before the barrier of line")) << error;
+}
+
+TEST(Emulation, FindsAShuffleWithLanesThatNeverCome) {
+  EXPECT_TRUE(says(error_of<Fault::kLostLane>(), "before the warp function")) << error_of<Fault::kLostLane>();
+}
+
+#if !defined(__SANITIZE_ADDRESS__)
+// The address sanitizer ends the process at the access itself: the faulty program is run under it instead.
+TEST(Emulation, FindsSharedMemoryOverrun) {
+  EXPECT_TRUE(says(error_of<Fault::kOverrun>(), "beyond its shared memory"));
+}
+TEST(Emulation, FindsGlobalMemoryOverrun) {
+  EXPECT_TRUE(says(error_of<Fault::kGlobalOverrun>(), "outside of an allocation"));
+}
+#endif
+
+TEST(Emulation, CopiesAreCheckedAgainstAllocations) {
+  cudaStream_t stream = nullptr;
+  ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
+  void* device = nullptr;
+  int host[2] = {1, 2};
+  ASSERT_EQ(cudaMalloc(&device, sizeof(int)), cudaSuccess);
+  EXPECT_EQ(cudaMemcpyAsync(device, host, sizeof(int), cudaMemcpyHostToDevice, stream), cudaSuccess);
+  EXPECT_EQ(cudaMemcpyAsync(device, host, sizeof host, cudaMemcpyHostToDevice, stream), cudaErrorInvalidValue);
+  EXPECT_EQ(cudaMemcpyAsync(host, device, sizeof(int), cudaMemcpyHostToDevice, stream), cudaErrorInvalidValue);
+  EXPECT_EQ(cudaFree(device), cudaSuccess);
+  EXPECT_EQ(cudaFree(device), cudaErrorInvalidValue);
+  cudaStreamDestroy(stream);
+}
+
+TEST(Emulation, GraphRepeatsWhatTheStreamWouldDo) {
+  cuda_emulation::set_order(Order::kForward);
+  cudaStream_t stream = nullptr;
+  ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
+  void* total = nullptr;
+  ASSERT_EQ(cudaMalloc(&total, sizeof(int)), cudaSuccess);
+  cudaMemsetAsync(total, 0, sizeof(int), stream);
+  cudaGraph_t graph = nullptr;
+  cudaGraphExec_t executable = nullptr;
+  ASSERT_EQ(cudaStreamBeginCapture(stream, cudaStreamCaptureModeThreadLocal), cudaSuccess);
+  BRECCIA_LAUNCH(sum_of_blocks<Fault::kNone>, dim3(kBlocks), dim3(kThreads), sizeof(Values), stream,
+                 static_cast<int*>(total));
+  ASSERT_EQ(cudaStreamEndCapture(stream, &graph), cudaSuccess);
+  ASSERT_EQ(cudaGraphInstantiate(&executable, graph, 0), cudaSuccess);
+  ASSERT_EQ(cudaGraphDestroy(graph), cudaSuccess);
+  int result = -1;
+  cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
+  EXPECT_EQ(result, 0);
+  for (int n = 0; n < 3; ++n) EXPECT_EQ(cudaGraphLaunch(executable, stream), cudaSuccess);
+  cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
+  EXPECT_EQ(result, 3 * kSum);
+  cudaGraphExecDestroy(executable);
+  cudaFree(total);
+  cudaStreamDestroy(stream);
+}
+
+}  // namespace
+}  // namespace breccia::cuda_test

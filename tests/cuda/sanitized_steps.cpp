@@ -1,0 +1,74 @@
+// A few steps of a small scene, a sorting included, through the engine on the emulated device: built with a sanitizer,
+// as racecheck (every lane is a thread to it) or memcheck of every kernel of the step. An argument makes it brief.
+#include <cstdio>
+#include <vector>
+
+#include "cuda/cuda_engine.hpp"
+
+namespace {
+
+using namespace breccia;
+
+// Three clumps that share tiles, and particles that share nothing.
+ParticleArrays particles(double cell) {
+  ParticleArrays p;
+  const auto add = [&](Vec3d position, Vec3d velocity) {
+    p.id.push_back(p.id.size());
+    p.position.push_back(cell * position);
+    p.velocity.push_back(velocity);
+    p.mass.push_back(2700.0 * 0.3 * cell * cell * cell);
+    p.body.push_back(0);
+    p.material.push_back(0);
+    p.damage.push_back(0.0);
+  };
+  for (int n = 0; n < 150; ++n) {
+    const double a = 0.37 * n, b = 0.73 * n;
+    add({a - 3.0 * static_cast<int>(a / 3.0), b - 5.0 * static_cast<int>(b / 5.0), 0.02 * n},
+        {n % 3 * 30.0, 10.0, -5.0});
+  }
+  for (int n = 0; n < 5; ++n) add({40.0 + 20.0 * n, 7.0, -30.0}, {1.0, 2.0, 3.0});
+  return p;
+}
+
+template <class P>
+void run(int sortings) {
+  grid::EngineSetup setup;
+  setup.cell = 1000.0;
+  setup.materials.resize(1);
+  setup.uniform_gravity = {0.0, 0.0, -1.0};
+  setup.numerics.precision = sizeof(typename P::Real) == 8 ? Precision::kDouble : Precision::kMixed;
+  const ParticleArrays all = particles(setup.cell);
+  material::FlawLists flaws;
+  for (std::size_t i = 0; i <= all.size(); ++i) flaws.first.push_back(static_cast<std::uint32_t>(2 * i));
+  for (std::size_t i = 0; i < all.size(); ++i) flaws.threshold.insert(flaws.threshold.end(), {1e-6F, 1e-3F});
+  cuda::CudaEngine<P> engine(setup, mpi::Comm(MPI_COMM_SELF));
+  const std::vector<Vec3d> spin(1);
+  engine.insert(all, flaws, spin);
+  constexpr double step = 0.02;
+  engine.scatter(0.5 * step);
+  for (int n = 0; n < sortings; ++n) {
+    engine.update_grid(step);
+    engine.gather_scatter(step);
+    engine.update_grid(step);
+    engine.gather(step);
+    engine.finish_damage();
+    engine.sort();
+    engine.scatter(0.5 * step);
+  }
+  engine.update_grid(step);
+  std::printf("%zu particles, %llu tiles, %llu alone, fastest %g m/s, work %g J\n", engine.observe().size(),
+              static_cast<unsigned long long>(engine.stats().tiles),
+              static_cast<unsigned long long>(engine.stats().lone_particles), engine.signal_speeds().particle,
+              engine.passes().plastic_work);
+}
+
+}  // namespace
+
+int main(int count, char** arguments) {
+  const breccia::mpi::Environment environment(&count, &arguments);
+  breccia::cuda_emulation::set_order(breccia::cuda_emulation::Order::kRandom, 1);
+  const bool briefly = count > 1;  // racecheck is slow, and both precisions are the same source
+  run<breccia::MixedPrecision>(briefly ? 1 : 3);
+  if (!briefly) run<breccia::DoublePrecision>(3);
+  return 0;
+}
