@@ -86,7 +86,7 @@ struct NumericsParameters {
   double asflip_alpha = 0.995;
   double asflip_beta = 1.0;
   int sort_interval = 32;         ///< most steps between two sortings
-  double energy_gain = 0.05;      ///< largest gain of energy over max(kinetic + |potential|)
+  double energy_gain = 0.5;       ///< largest gain of energy over max(kinetic + |potential|)
   bool lone_without_grid = true;  ///< closed form for particles that share no node with another one
   LiteralSwitches literal;
 };

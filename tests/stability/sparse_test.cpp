@@ -29,6 +29,8 @@ TEST_P(Sparse, StressedParticleDoesNotPushItselfAnywhereInACell) {
             "\nvelocity = [\"30 m/s\", \"-10 m/s\", \"1 m/s\"]\nspin = [0, \"0.3 rad/s\", \"0.6 rad/s\"]\n";
   }
   text += "[effects]\ngravity = \"off\"\ndamage = false\nstrength = false\n";
+  // Particles that spin like this tear themselves apart: their tension is work of the rotation, not of an instability.
+  text += "[numerics]\nenergy_gain = 1e6\n";
   for (const char* lone : {"numerics.lone_without_grid=false", "numerics.lone_without_grid=true"}) {
     const Course course = follow(scene(text, {lone}), {.steps = 20});
     double stress = 0.0;
