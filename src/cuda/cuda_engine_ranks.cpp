@@ -4,21 +4,13 @@
 #include <utility>
 
 #include "cuda/cuda_engine.hpp"
+#include "mpi/message.hpp"
 
 namespace breccia::cuda {
 namespace {
 
-// Reads and writes plain values in a message.
-template <class T>
-void put(std::vector<std::byte>& message, const T* values, std::size_t count) {
-  const auto* bytes = reinterpret_cast<const std::byte*>(values);
-  message.insert(message.end(), bytes, bytes + count * sizeof(T));
-}
-template <class T>
-void get(const std::byte*& from, T* values, std::size_t count) {
-  std::memcpy(values, from, count * sizeof(T));
-  from += count * sizeof(T);
-}
+using mpi::get;
+using mpi::put;
 
 }  // namespace
 

@@ -7,6 +7,7 @@
 
 #include "breccia/error.hpp"
 #include "grid/host_engine.hpp"
+#include "mpi/message.hpp"
 #include "mpi/together.hpp"
 
 namespace breccia::grid {
@@ -27,17 +28,8 @@ constexpr std::int32_t tile_node(const std::int32_t (&node)[3]) {
   return ((node[0] & 3) + kNodeBias) | (((node[1] & 3) + kNodeBias) << 8) | (((node[2] & 3) + kNodeBias) << 16);
 }
 
-// Reads and writes plain values in a message.
-template <class T>
-void put(std::vector<std::byte>& message, const T* values, std::size_t count) {
-  const auto* bytes = reinterpret_cast<const std::byte*>(values);
-  message.insert(message.end(), bytes, bytes + count * sizeof(T));
-}
-template <class T>
-void get(const std::byte*& from, T* values, std::size_t count) {
-  std::memcpy(values, from, count * sizeof(T));
-  from += count * sizeof(T);
-}
+using mpi::get;
+using mpi::put;
 
 }  // namespace
 

@@ -1,5 +1,5 @@
-// Gravity's interactions compiled for CUDA threads, one target a thread: particle with particle (whole and short-range),
-// particle with cell, cell with cell, and the rule of when a cell is opened.
+// Gravity's interactions compiled for CUDA threads, one target a thread: particle with particle (whole and
+// short-range), particle with cell, cell with cell, and the rule of when a cell is opened.
 #include "gravity/mesh/split.hpp"
 #include "gravity/pair_law.hpp"
 #include "gravity/tree/multipole.hpp"
@@ -51,8 +51,8 @@ __global__ void sum_short_range(const Source<R>* sources, int count, const Vec3<
 
 // One expansion from all sources that may be expanded, passed on and evaluated.
 template <class R>
-__global__ void expand(const Cell* cells, int count, const Cell* targets, double allowed, R softening_squared, Vec3<R> r,
-                       Vec3<R>* acceleration) {
+__global__ void expand(const Cell* cells, int count, const Cell* targets, double allowed, R softening_squared,
+                       Vec3<R> r, Vec3<R>* acceleration) {
   const int i = static_cast<int>(blockIdx.x * blockDim.x + threadIdx.x);
   LocalExpansion<R> l{};
   for (int j = 0; j < count; ++j) {
@@ -68,9 +68,9 @@ __global__ void expand(const Cell* cells, int count, const Cell* targets, double
   acceleration[i] = evaluate(shifted(l, R(0.5) * r), R(0.5) * r).gradient;
 }
 
-#define BRECCIA_INSTANTIATE(R)                                                                                     \
-  template __global__ void sum_sources<R>(const Source<R>*, int, const Vec3<R>*, R, Vec3<R>*);                     \
-  template __global__ void sum_short_range<R>(const Source<R>*, int, const Vec3<R>*, ShortRange<R>, Vec3<R>*);     \
+#define BRECCIA_INSTANTIATE(R)                                                                                 \
+  template __global__ void sum_sources<R>(const Source<R>*, int, const Vec3<R>*, R, Vec3<R>*);                 \
+  template __global__ void sum_short_range<R>(const Source<R>*, int, const Vec3<R>*, ShortRange<R>, Vec3<R>*); \
   template __global__ void expand<R>(const Cell*, int, const Cell*, double, R, Vec3<R>, Vec3<R>*);
 BRECCIA_INSTANTIATE(float)
 BRECCIA_INSTANTIATE(double)
