@@ -11,6 +11,7 @@
 
 #include "cuda/cuda_engine.hpp"
 #include "scene/bodies.hpp"
+#include "tests/support/flaws.hpp"
 
 namespace breccia::cuda {
 
@@ -63,18 +64,7 @@ inline EngineSetup setup_for(const Scene& scene) {
   return setup;
 }
 
-inline material::FlawLists flaws_of(const Scene& scene, const ParticleArrays& particles) {
-  material::FlawLists lists;
-  lists.first.push_back(0);
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    const BodyParameters& body = scene.bodies[particles.body[i]];
-    const std::uint64_t index = particles.id[i] - body.first_id;
-    const auto one = material::draw_flaws(body.particles, body.mass / 2700.0, {}, 1, particles.body[i], {&index, 1});
-    lists.threshold.insert(lists.threshold.end(), one.threshold.begin(), one.threshold.end());
-    lists.first.push_back(static_cast<std::uint32_t>(lists.threshold.size()));
-  }
-  return lists;
-}
+using test::flaws_of;
 
 inline std::unique_ptr<Engine> make_cuda_engine(const EngineSetup& setup, const mpi::Comm& comm = self()) {
   if (setup.numerics.precision == Precision::kDouble) return std::make_unique<CudaEngine<DoublePrecision>>(setup, comm);

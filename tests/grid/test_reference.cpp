@@ -9,6 +9,7 @@
 #include "grid/reference_step.hpp"
 #include "scene/bodies.hpp"
 #include "scene/orbit.hpp"
+#include "tests/support/flaws.hpp"
 
 namespace breccia::grid {
 namespace {
@@ -67,18 +68,7 @@ ParticleArrays share(const ParticleArrays& all, const mpi::Comm& comm) {
   return mine;
 }
 
-material::FlawLists flaws_of(const Scene& scene, const ParticleArrays& particles) {
-  material::FlawLists lists;
-  lists.first.push_back(0);
-  for (std::size_t i = 0; i < particles.size(); ++i) {
-    const BodyParameters& body = scene.bodies[particles.body[i]];
-    const std::uint64_t index = particles.id[i] - body.first_id;
-    const auto one = material::draw_flaws(body.particles, body.mass / 2700.0, {}, 1, particles.body[i], {&index, 1});
-    lists.threshold.insert(lists.threshold.end(), one.threshold.begin(), one.threshold.end());
-    lists.first.push_back(static_cast<std::uint32_t>(lists.threshold.size()));
-  }
-  return lists;
-}
+using test::flaws_of;
 
 EngineSetup setup_for(const Scene& scene, const material::RuntimeEffects& effects, int threads) {
   EngineSetup setup;
