@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import stat
 import subprocess
 import tempfile
@@ -61,19 +62,21 @@ class Scripts(unittest.TestCase):
         return self.run_script("pbs-cpu.sh", **(defaults | {"LAUNCHER": "mpirun -n 2"} | variables))
 
     def test_pbs_submits_itself_until_done(self):
-        submitted = 0
-        for _ in range(20):
+        # 1e7 steps of 1,500 particles with gravity: hours on any machine, so that two jobs run out of time.
+        scene = self.folder / "scene.toml"
+        scene.write_text(SCENE.replace("1000 s", "500000 s"))
+        for _ in range(2):
             process = self.run_pbs(RESOURCES="select=1:ncpus=2")
             self.assertEqual(process.returncode, 0, process.stderr)
-            calls = self.calls()
-            if not calls:
-                break
-            self.assertEqual(calls, [f"qsub -V -l walltime=00:00:03 -l select=1:ncpus=2 {SCRIPTS}/pbs-cpu.sh"])
-            submitted += 1
-        # 20,000 steps of 1,500 particles with gravity: more than three seconds, and less than a minute.
-        self.assertGreaterEqual(submitted, 1)
+            self.assertEqual(
+                self.calls(), [f"qsub -V -l walltime=00:00:03 -l select=1:ncpus=2 {SCRIPTS}/pbs-cpu.sh"])
+        steps = int(re.findall(r"stopped at .* step (\d+),", process.stderr)[-1]) + 32
+        scene.write_text(SCENE.replace("1000 s", f"{steps * 0.05} s"))
+        process = self.run_pbs(RESOURCES="select=1:ncpus=2")
+        self.assertEqual(process.returncode, 0, process.stderr)
+        self.assertEqual(self.calls(), [])
         summary = json.loads((self.folder / "out/summary.json").read_text())
-        self.assertEqual(summary["steps"], 20000)
+        self.assertEqual(summary["steps"], steps)
 
     def test_a_failure_is_not_repeated(self):
         process = self.run_pbs(SCENE="absent.toml")
