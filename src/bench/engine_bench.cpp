@@ -13,6 +13,7 @@
 #include "breccia/error.hpp"
 #include "breccia/isa.hpp"
 #include "breccia/precision.hpp"
+#include "grid/device.hpp"
 #include "io/machine.hpp"
 #include "sim/setup.hpp"
 
@@ -37,10 +38,12 @@ struct Measured {
   double bytes_per_particle = 0.0;
 };
 
-Measured measure(const EngineCase& c, const EffectChoice& effects, Precision precision, int threads, double seconds) {
+Measured measure(const EngineCase& c, const EffectChoice& effects, Precision precision, int threads, double seconds,
+                 grid::EngineMaker make) {
   const Scene scene = make_scene(c, effects, precision);
   const mpi::Comm self(MPI_COMM_SELF);
-  const auto engine = sim::make_loaded_engine(scene, sim::resolve_effects(scene), make_state(c, scene), threads, self);
+  const auto engine =
+      sim::make_loaded_engine(scene, sim::resolve_effects(scene), make_state(c, scene), threads, self, make);
   const double dt = *scene.time.step;
   const int interval = scene.numerics.sort_interval;
   engine->scatter(0.5 * dt);
@@ -114,10 +117,15 @@ std::vector<Row> rows(const EngineBenchOptions& options) {
 
 void run_engine_bench(const EngineBenchOptions& options) {
   const std::vector<Row> table_rows = rows(options);
-  const std::vector<int> cores = options.cores.empty() ? std::vector<int>{1, 2} : options.cores;
+  const mpi::Comm self(MPI_COMM_SELF);
+  const grid::EngineChoice engine =
+      grid::choose_engine(options.device == "cuda" ? grid::Device::kCuda : grid::Device::kHost, self);
+  std::vector<int> cores = options.cores.empty() ? std::vector<int>{1, 2} : options.cores;
+  if (engine.device != "host") cores = {1};
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
   const io::Machine machine = io::this_machine();
   std::FILE* table = options.json == "-" ? stderr : stdout;
+  if (engine.device != "host") fmt::print(table, "device: {}; ", engine.reason);
   fmt::print(table, "{}, {}, {}; no gravity, sorting included, best cycle of {} steps\n", machine.cpu_model,
              isa_name(active_isa()), io::library_versions().at(1).second, NumericsParameters{}.sort_interval);
   fmt::print(table, "{:<10} {:<13} {:<6} {:>5} {:>24} {:>24} {:>15}\n", "case", "effects", "prec.", "cores",
@@ -125,24 +133,27 @@ void run_engine_bench(const EngineBenchOptions& options) {
   for (const Row& row : table_rows) {
     for (const Precision precision : chosen_precisions(options.precision)) {
       for (const int threads : cores) {
-        const Measured m = measure(row.state, row.effects, precision, threads, options.seconds);
+        const Measured m = measure(row.state, row.effects, precision, threads, options.seconds, engine.make);
         fmt::print(table, "{:<10} {:<13} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}\n", row.state.name, row.effects.name,
                    name_of(precision), threads, 1e-6 * m.rate, 1e-6 * m.wall_rate, m.bytes_per_particle);
         std::fflush(table);
-        results.push_back({{"case", row.state.name},
-                           {"precision", name_of(precision)},
-                           {"cores", threads},
-                           {"effects", row.effects.name},
-                           {"particle_steps_per_second", threads == 1 ? m.rate : m.wall_rate},
-                           {"particle_steps_per_cpu_second", m.rate},
-                           {"particle_steps_per_wall_second", m.wall_rate},
-                           {"bytes_per_particle", m.bytes_per_particle}});
+        results.push_back(
+            {{"case", row.state.name},
+             {"precision", name_of(precision)},
+             {"cores", threads},
+             {"effects", row.effects.name},
+             {"particle_steps_per_second", threads == 1 && engine.device == "host" ? m.rate : m.wall_rate},
+             {"particle_steps_per_cpu_second", m.rate},
+             {"particle_steps_per_wall_second", m.wall_rate},
+             {"bytes_per_particle", m.bytes_per_particle}});
       }
     }
   }
   const nlohmann::ordered_json document = {{"machine", machine.cpu_model},
                                            {"instruction_set", isa_name(active_isa())},
                                            {"compiler", io::library_versions().at(1).second},
+                                           {"device", engine.device},
+                                           {"device_name", engine.reason},
                                            {"results", results}};
   write_json(document, options.json);
 }

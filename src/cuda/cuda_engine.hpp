@@ -8,6 +8,7 @@
 
 #include "cuda/device_array.hpp"
 #include "cuda/device_grid.hpp"
+#include "cuda/device_memory.hpp"
 #include "cuda/device_particles.hpp"
 #include "cuda/halo.hpp"
 #include "cuda/launchers.hpp"
@@ -55,8 +56,9 @@ class CudaEngine final : public grid::Engine {
 
   [[nodiscard]] PassArguments<Real> pass_arguments(double step, double half_step) const;
   [[nodiscard]] NodeArguments<Real> node_arguments(double kick) const;
-  void launch_pass(const PassArguments<Real>& arguments);
+  void launch_pass(PassArguments<Real> arguments);
   void settle();
+  void require_memory(const Load& load) const;
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
   [[nodiscard]] ParticleOutput read_particles(const std::vector<Real>& new_velocity,
                                               const std::vector<Real>& node_mass) const;
@@ -68,6 +70,7 @@ class CudaEngine final : public grid::Engine {
   [[nodiscard]] std::vector<std::vector<std::byte>> messages_of(const std::vector<std::vector<unsigned>>& leaving,
                                                                 std::span<const grid::BlockKey> keys);
   void cut_anew();
+  void drop_flaws_of_others();
   void save_flaws(EngineState& state) const;
   void switch_damage_off();
   [[nodiscard]] std::vector<Vec3d> positions() const;
@@ -85,6 +88,7 @@ class CudaEngine final : public grid::Engine {
   DeviceArray<BoundaryPlane> walls_;
   DeviceArray<float> flaw_thresholds_;
   std::vector<float> flaw_thresholds_host_;  // the same: they never change, and go with particles to other ranks
+  std::size_t own_flaws_ = 0;                // of them, the others belonging to particles that have gone
   DeviceArray<PassSums> pass_sums_;
   DeviceArray<unsigned> counts_;  // strayed particles; volume changes cut since the last sorting
   Transfer<Real> transfer_{};

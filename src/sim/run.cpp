@@ -216,7 +216,9 @@ std::unique_ptr<TimeLoop> make_loop(const Scene& scene, const std::optional<Rest
 }
 
 void print_device(const grid::EngineChoice& engine, const mpi::Comm& comm) {
-  if (!comm.is_root() || engine.reason.empty()) return;
+  if (!comm.is_root()) return;
+  if (!engine.warning.empty()) fmt::print(stderr, "breccia: warning: {}\n", engine.warning);
+  if (engine.reason.empty()) return;
   fmt::print("device: {} ({})\n", engine.device, engine.reason);
 }
 
