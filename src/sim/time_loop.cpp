@@ -112,16 +112,35 @@ void TimeLoop::between_steps() {
   const double largest_move = comm_.max(passes.largest_move);
   timers_("damage", [&] { engine_->finish_damage(); });
   timers_("sort", [&] { engine_->sort(); });
-  if (window_.due()) begin_window();
+  if (window_.due()) {
+    begin_window();
+  } else if (adaptive_) {
+    shorten_step();
+  }
   set_sort_interval(largest_move * dt_ / previous_dt_);
 }
 
 void TimeLoop::begin_window() {
   if (adaptive_) {
-    timers_("time step", [&] { dt_ = stable_step(scene_, engine_->signal_speeds(), viscosity_).seconds; });
+    dt_ = stable_step_now();
     guard_.check_step(dt_, *engine_);
   }
   if (solver_) evaluate_gravity();
+}
+
+// Inside a window dt stays, for which gravity was predicted, unless a shock has used up a quarter of the margin that
+// cfl leaves.
+void TimeLoop::shorten_step() {
+  const double stable = stable_step_now(), limit = stable / scene_.time.cfl;
+  if (dt_ <= stable + 0.25 * (limit - stable)) return;
+  dt_ = stable;
+  guard_.check_step(dt_, *engine_);
+}
+
+double TimeLoop::stable_step_now() {
+  double step = 0.0;
+  timers_("time step", [&] { step = stable_step(scene_, engine_->signal_speeds(), viscosity_).seconds; });
+  return step;
 }
 
 void TimeLoop::evaluate_gravity() {

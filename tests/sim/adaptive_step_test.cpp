@@ -1,4 +1,5 @@
-// Steps chosen by the stability limit: changed at window starts only, second order, stable (physics.md 5).
+// Steps chosen by the stability limit: changed at window starts, shortened inside a window by shocks only; second order,
+// stable (physics.md 5).
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -50,13 +51,38 @@ TEST_P(AdaptiveStep, FollowsTheLimitAtWindowStarts) {
       dt = loop.dt();
       EXPECT_NEAR(dt, 0.4 * limit, 0.01 * limit) << "step " << loop.step();
     }
-    EXPECT_EQ(loop.dt(), dt) << "step " << loop.step();
+    EXPECT_EQ(loop.dt(), dt) << "step " << loop.step();  // too mild a change to shorten it
     EXPECT_LT(dt, 0.6 * limit) << "step " << loop.step();
     smallest = std::min(smallest, dt);
     largest = std::max(largest, dt);
     return loop.time() < 0.15;
   });
   EXPECT_GT(largest, 1.2 * smallest);
+}
+
+// Balls that meet at 1.8 times their sound speed within one window: compression and heat raise the sound speed and the
+// viscosity many times over before the next. Held through the window the first step breaks the run within a few; the
+// limit is looked at whenever particles are sorted, which is at every step or two at such speeds. What a step that
+// stands unchanged may come to in between is less than the limit itself.
+TEST_P(AdaptiveStep, IsShortenedByAShockInsideAWindow) {
+  const Scene scene = load(kSoftCollision, {precision(), "gravity.interval=256", "numerics.sort_interval=64",
+                                            "body[0].velocity=[\"25 m/s\", 0, 0]",
+                                            "body[1].velocity=[\"-25 m/s\", 0, 0]"});
+  std::optional<Budget> budget;
+  double first_dt = 0.0, dt = HUGE_VAL, kinetic = 0.0, gained = 0.0;
+  simulate(scene, [&](const TimeLoop& loop) {
+    const double limit = stable_step(scene, loop.engine().signal_speeds(), true).seconds / scene.time.cfl;
+    EXPECT_LT(loop.dt(), limit) << "step " << loop.step();
+    EXPECT_LE(loop.dt(), dt) << "grows inside a window, step " << loop.step();
+    if (!budget) budget.emplace(nullptr, Vec3d{}, mpi::Comm(MPI_COMM_SELF));
+    const io::DiagnosticsRow row = budget->row(loop.engine(), loop.engine().observe(), loop.lost_work());
+    if (loop.step() == 0) first_dt = loop.dt(), kinetic = row.kinetic_energy;
+    dt = loop.dt();
+    gained = std::max(gained, row.energy_residual);
+    return loop.step() < 255 && loop.time() < 0.05;
+  });
+  EXPECT_LT(dt, 0.5 * first_dt);
+  EXPECT_LT(gained, 1e-3 * kinetic);
 }
 
 // Kinetic energy and budget after a gentler collision, of the kinetic energy before it.
