@@ -1,5 +1,5 @@
-// Steps chosen by the stability limit: changed at window starts, shortened inside a window by shocks only; second order,
-// stable (physics.md 5).
+// Steps chosen by the stability limit: changed at window starts, shortened inside a window by shocks only; second
+// order, stable (physics.md 5).
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -65,9 +65,9 @@ TEST_P(AdaptiveStep, FollowsTheLimitAtWindowStarts) {
 // limit is looked at whenever particles are sorted, which is at every step or two at such speeds. What a step that
 // stands unchanged may come to in between is less than the limit itself.
 TEST_P(AdaptiveStep, IsShortenedByAShockInsideAWindow) {
-  const Scene scene = load(kSoftCollision, {precision(), "gravity.interval=256", "numerics.sort_interval=64",
-                                            "body[0].velocity=[\"25 m/s\", 0, 0]",
-                                            "body[1].velocity=[\"-25 m/s\", 0, 0]"});
+  const Scene scene =
+      load(kSoftCollision, {precision(), "gravity.interval=256", "numerics.sort_interval=64",
+                            "body[0].velocity=[\"25 m/s\", 0, 0]", "body[1].velocity=[\"-25 m/s\", 0, 0]"});
   std::optional<Budget> budget;
   double first_dt = 0.0, dt = HUGE_VAL, kinetic = 0.0, gained = 0.0;
   simulate(scene, [&](const TimeLoop& loop) {
