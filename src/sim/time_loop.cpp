@@ -1,6 +1,7 @@
 #include "sim/time_loop.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "sim/setup.hpp"
 
@@ -172,8 +173,11 @@ LostWork TimeLoop::lost_work() const {
 }
 
 void TimeLoop::set_sort_interval(double cells_per_step) {
-  // Particles may drift one cell between sortings; half of it is left for those that speed up meanwhile.
-  const double steps = cells_per_step > 0.0 ? 0.5 / cells_per_step : scene_.numerics.sort_interval;
+  // Particles may drift one cell between sortings: half of it with their speed and the uniform field, v n + g n^2/2 =
+  // 1/2 in cells and steps, and half is left for what else speeds them up meanwhile.
+  const double field = std::sqrt(dot(scene_.gravity.uniform, scene_.gravity.uniform)) * dt_ * dt_ / scene_.cell;
+  const double rate = cells_per_step + std::sqrt(cells_per_step * cells_per_step + field);
+  const double steps = rate > 0.0 ? 1.0 / rate : scene_.numerics.sort_interval;
   sort_interval_ = std::clamp(static_cast<int>(std::min(steps, 1e6)), 1, scene_.numerics.sort_interval);
 }
 

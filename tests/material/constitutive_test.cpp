@@ -129,10 +129,10 @@ TEST(Constitutive, TensionFallsWithDamageAndEndsAtTheApex) {
   EXPECT_EQ(squared_norm(intact.state.elastic), 0.0);
 }
 
-// Viscous heat is the work of what q adds to the stress: damage takes its share of what only relieves tension (all of it
-// where q is less than the tension), and beyond the apex q counts only where it is kept out of the yield strength. q of
-// 21 MPa (closing at 1e-3 1/s) beside pressures of -54 to 27 MPa, with all of them above the apex of intact rock, -75
-// MPa.
+// Viscous heat is the work of what q adds to the stress: damage takes its share of what only relieves tension (all of
+// it where q is less than the tension), and beyond the apex q counts only where it is kept out of the yield strength. q
+// of 21 MPa (closing at 1e-3 1/s) beside pressures of -54 to 27 MPa, with all of them above the apex of intact rock,
+// -75 MPa.
 TEST(Constitutive, ViscousHeatIsTheWorkOfWhatViscosityAddsToTheStress) {
   const Matrix3d l = -1e-3 / 3.0 * Matrix3d::Identity();
   for (const bool in_yield : {true, false}) {
