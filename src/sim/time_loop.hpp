@@ -1,4 +1,5 @@
-// The time step as a script: grid, particles, and at the start of a window sorting, gravity and the choice of dt.
+// The time step as a script: grid, particles, and at the start of a window sorting, gravity and the choice of dt, which
+// a shock may shorten at a sorting inside the window.
 #pragma once
 
 #include <functional>
@@ -56,6 +57,8 @@ class TimeLoop {
   void between_steps();
   void check();  // of the guard
   void begin_window();
+  void shorten_step();
+  [[nodiscard]] double stable_step_now();
   void evaluate_gravity();
   [[nodiscard]] bool sorting_due() const { return steps_since_sort_ + 1 >= sort_interval_; }
   void set_sort_interval(double cells_per_step);
