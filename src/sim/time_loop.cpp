@@ -71,10 +71,17 @@ void TimeLoop::make_solver(const ResolvedEffects& effects, int threads) {
   solver_ = gravity::make_solver(effects.gravity_method, parameters, comm_, threads);
 }
 
+void TimeLoop::record(Timeline& timeline) {
+  timeline_ = &timeline;
+  engine_->record(&timeline);
+  timers_.record(&timeline);
+}
+
 LoopState TimeLoop::state() const { return {time_, dt_, previous_dt_, step_, sort_interval_, comm_.allgather(lost_)}; }
 
 void TimeLoop::run(const Visit& at_time_step, const Visit& at_window_start) {
   for (;;) {
+    if (timeline_ != nullptr) timeline_->begin_step();
     // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
     timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
     if (!at_time_step(*this)) return check();

@@ -49,6 +49,8 @@ class TimeLoop {
   [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
   [[nodiscard]] const Guard& guard() const { return guard_; }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
+  /// Notes in `timeline` what is done when.
+  void record(Timeline& timeline);
 
  private:
   bool one_step(const Visit& at_window_start);
@@ -80,6 +82,7 @@ class TimeLoop {
   int sort_interval_ = 1;
   int steps_since_sort_ = 0;
   mutable StageTimers timers_;
+  Timeline* timeline_ = nullptr;
 };
 
 }  // namespace breccia::sim
