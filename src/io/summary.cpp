@@ -79,6 +79,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["remnants"] = summary.remnants;
   json["stages"] = stages_json(summary.stages);
   json["gravity"] = summary.gravity;
+  json["slabs"] = summary.slabs;
   json["versions"] = versions_json();
   json["machine"] = machine_json();
   json["scene"] = scene_json(summary.scene);

@@ -44,6 +44,7 @@ struct RunSummary {
   nlohmann::json remnants = nlohmann::json::array();  ///< largest first (remnants_json.hpp)
   std::vector<StageTiming> stages;
   nlohmann::json gravity;                ///< what its evaluations came to; null without self-gravity
+  nlohmann::json slabs;                  ///< axis, balance of the ranks' work, bytes of the halo at the end
   std::vector<ResolvedKey> scene;        ///< every key as resolved
   std::vector<std::string> unused_keys;  ///< keys that had no effect in this run
 };
