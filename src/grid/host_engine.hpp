@@ -82,7 +82,6 @@ class HostEngine final : public Engine {
   // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
   void settle(std::vector<Placement> placements);
   void choose_slabs(std::span<const Placement> placements);
-  [[nodiscard]] std::uint32_t intact_packs(const Tile& tile) const;  // in which damage may grow
   [[nodiscard]] std::vector<Placement> place_all() const;
   void migrate(std::vector<Placement>& placements);
   [[nodiscard]] SortedPlacements separate(std::vector<Placement> placements);

@@ -5,10 +5,9 @@ namespace breccia::grid {
 
 /// Cost of one step [ps]. A tile costs by itself (its nodes are copied and updated), and its particles by the pack.
 struct WorkWeights {
-  double tile;         ///< that holds particles
-  double pack;         ///< of particles in a tile, full or not
-  double lone_pack;    ///< of particles without grid
-  double intact_pack;  ///< besides, where damage may grow in a pack
+  double tile;       ///< that holds particles
+  double pack;       ///< of particles in a tile, full or not
+  double lone_pack;  ///< of particles without grid
 };
 
 }  // namespace breccia::grid

@@ -5,14 +5,16 @@
 namespace breccia::sim {
 namespace {
 
-// Time of one evaluation on a host core, by what its Solver::work() counts [ps] (breccia_bench work).
+// Time of one evaluation on a core of a Xeon with AVX-512, mixed precision, by what its Solver::work() counts [ps]
+// (breccia_bench work, phases of --profile). The transforms of the mesh are not in it: ranks share them by planes of the
+// mesh, wherever the particles are.
 struct GravityWeights {
   double unit;      ///< of the work, a pair of particles
-  double particle;  ///< besides, for each particle
+  double particle;  ///< besides, for each particle: sorting, moments, assignment
 };
-constexpr GravityWeights kDirect{.unit = 1, .particle = 0};
-constexpr GravityWeights kTree{.unit = 1, .particle = 0};
-constexpr GravityWeights kTreePm{.unit = 1, .particle = 0};
+constexpr GravityWeights kDirect{.unit = 276, .particle = 0};
+constexpr GravityWeights kTree{.unit = 360, .particle = 90e3};
+constexpr GravityWeights kTreePm{.unit = 430, .particle = 120e3};
 
 const GravityWeights& weights_of(GravityMethod method) {
   return method == GravityMethod::kDirect ? kDirect : method == GravityMethod::kTree ? kTree : kTreePm;
