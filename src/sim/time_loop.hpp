@@ -8,6 +8,7 @@
 #include "gravity/solver.hpp"
 #include "gravity/window.hpp"
 #include "grid/engine.hpp"
+#include "sim/balance.hpp"
 #include "sim/diagnostics.hpp"
 #include "sim/effects.hpp"
 #include "sim/gravity_record.hpp"
@@ -48,6 +49,7 @@ class TimeLoop {
   [[nodiscard]] LostWork lost_work() const;
   [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
   [[nodiscard]] const Guard& guard() const { return guard_; }
+  [[nodiscard]] const BalanceState& balance() const { return balance_.state(); }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
   /// Notes in `timeline` what is done when.
   void record(Timeline& timeline);
@@ -62,6 +64,7 @@ class TimeLoop {
   void shorten_step();
   [[nodiscard]] double stable_step_now();
   void evaluate_gravity();
+  void balance_ranks();
   [[nodiscard]] bool sorting_due() const { return steps_since_sort_ + 1 >= sort_interval_; }
   void set_sort_interval(double cells_per_step);
 
@@ -74,6 +77,7 @@ class TimeLoop {
   gravity::Window window_;
   GravityRecord gravity_record_;
   Guard guard_;
+  Balance balance_;
   LostWork lost_;  // up to the last sorting
   double time_ = 0.0;
   double dt_ = 0.0;           // of the step that comes
