@@ -10,6 +10,13 @@
 
 namespace breccia::gravity {
 
+/// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree, of which scales are sampled.
+inline constexpr std::int64_t kCoarseCells = 1024;
+BRECCIA_HD std::int64_t coarse_limit(std::int64_t all_particles) {
+  const std::int64_t share = all_particles / kCoarseCells;
+  return share > kGroupParticles ? share : kGroupParticles;
+}
+
 inline constexpr std::size_t kMostChildren = 8;
 
 /// Its children differ in `bits` key bits after the first `start`; bits = 0 for a leaf.

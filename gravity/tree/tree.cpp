@@ -14,10 +14,6 @@ constexpr std::uint32_t kRootStream = 0x67726176;
 
 }  // namespace
 
-std::int64_t coarse_limit(std::int64_t all_particles) {
-  return std::max(kGroupParticles, all_particles / kCoarseCells);
-}
-
 Root random_root(Vec3d low, Vec3d high) {
   const Vec3d extent = high - low;
   const double largest = std::max({extent.x, extent.y, extent.z, 1e-3});

@@ -17,12 +17,6 @@
 
 namespace breccia::gravity {
 
-/// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree, of which scales are sampled.
-inline constexpr std::int64_t kCoarseCells = 1024;
-
-/// Cells of more particles belong to the coarse tree.
-std::int64_t coarse_limit(std::int64_t all_particles);
-
 /// Sorted particles, coordinates scaled (Root::scaled). What other ranks sent (SharedTree) follows and has no key and
 /// no order.
 struct SortedParticles {

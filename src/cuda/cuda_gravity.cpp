@@ -2,10 +2,15 @@
 
 #include <array>
 #include <cmath>
+#include <string>
 #include <utility>
 
+#include "breccia/constants.hpp"
 #include "cuda/direct_gravity.hpp"
 #include "gravity/evaluation.hpp"
+#include "gravity/method.hpp"
+#include "gravity/tree/tree.hpp"
+#include "gravity/tree/unsplit.hpp"
 
 namespace breccia::cuda {
 
@@ -19,22 +24,32 @@ CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& 
       particles_(std::move(particles)),
       comm_(comm),
       stream_(stream),
-      bodies_(comm, stream) {}
+      bodies_(comm, stream),
+      tree_(stream),
+      walk_(stream) {}
 
 template <class Real>
 bool CudaGravity<Real>::has(GravityMethod method) {
-  return method == GravityMethod::kDirect;
+  return method == GravityMethod::kDirect || method == GravityMethod::kTree || method == GravityMethod::kAuto;
 }
 
 template <class Real>
-void CudaGravity<Real>::choose_method() {
-  stats_ = {.method = method_};
+void CudaGravity<Real>::choose_method(unsigned particles) {
+  stats_.method = method_;
+  if (method_ != GravityMethod::kAuto) return;
+  if (particles <= kMostDirect || parameters_.error < gravity::kSmallestTreeError) {
+    stats_.method = GravityMethod::kDirect;
+    stats_.reason = "direct sum on the device for up to " + std::to_string(kMostDirect) + " particles";
+  } else {
+    stats_.method = GravityMethod::kTree;
+    stats_.reason = "tree on the device for more than " + std::to_string(kMostDirect) + " particles";
+  }
 }
 
 template <class Real>
 void CudaGravity<Real>::evaluate_and_hold(double time) {
   const PredictArguments<Real> own = particles_(time);
-  choose_method();
+  stats_ = {};
   const gravity::Stopwatch watch(stats_.seconds);
   stats_.phases.time(Phase::kExchange, [&] { bodies_.gather(own); });
   stats_.bytes_sent = bodies_.bytes_sent();
@@ -42,7 +57,12 @@ void CudaGravity<Real>::evaluate_and_hold(double time) {
   const double mass_unit = extremes.of[6] > 0.0 ? extremes.of[6] : 1.0;
 
   acceleration_.reserve(3 * std::size_t{own.count});
-  stats_.phases.time(Phase::kPairs, [&] { sum_directly(mass_unit); });
+  choose_method(bodies_.all().count);
+  if (stats_.method == GravityMethod::kDirect) {
+    stats_.phases.time(Phase::kPairs, [&] { sum_directly(mass_unit); });
+  } else {
+    sum_by_tree(extremes, mass_unit);
+  }
   const Vec3d net = net_force(own);
   launch_hold(acceleration_.data(), net, own.particles, own.count, stream_);
 }
@@ -53,6 +73,30 @@ void CudaGravity<Real>::sum_directly(double mass_unit) {
   launch_direct_sum<Real>({all, bodies_.first(), bodies_.own(), mass_unit, parameters_.softening}, acceleration_.data(),
                           scratch_, stream_);
   stats_.pairs = static_cast<double>(bodies_.own()) * static_cast<double>(all.count);
+}
+
+template <class Real>
+void CudaGravity<Real>::sum_by_tree(const Extremes& extremes, double mass_unit) {
+  const BodyArrays all = bodies_.all();
+  if (all.count == 0) return;
+  const double(&e)[7] = extremes.of;
+  const gravity::Root root = gravity::random_root({-e[3], -e[4], -e[5]}, {e[0], e[1], e[2]});
+  const double softening = parameters_.softening / root.unit;
+  stats_.phases.time(Phase::kSort,
+                     [&] { tree_.build(all, root, mass_unit, softening, bodies_.first(), bodies_.own()); });
+  stats_.phases.time(Phase::kTree, [&] {
+    walk_.evaluate(tree_,
+                   {.tolerance = gravity::opening_for(parameters_),
+                    .softening = softening,
+                    .first = bodies_.first(),
+                    .own = bodies_.own(),
+                    .unit = kGravitationalConstant * mass_unit / (root.unit * root.unit)},
+                   acceleration_.data());
+    const WalkCounts counts = walk_.counts();
+    stats_.pairs = static_cast<double>(counts.pairs);
+    stats_.cell_interactions = static_cast<double>(counts.cells);
+    stats_.expansions = static_cast<double>(counts.expansions);
+  });
 }
 
 // Books the momentum error; returns what is to be taken off each particle, as a share of its |a|.

@@ -4,7 +4,9 @@
 
 #include <functional>
 
+#include "cuda/device_tree.hpp"
 #include "cuda/gravity_bodies.hpp"
+#include "cuda/tree_gravity.hpp"
 #include "gravity/resident.hpp"
 
 namespace breccia::cuda {
@@ -28,8 +30,9 @@ class CudaGravity final : public gravity::ResidentSolver {
   [[nodiscard]] const gravity::Stats& last() const override { return stats_; }
 
  private:
-  void choose_method();
+  void choose_method(unsigned particles);
   void sum_directly(double mass_unit);
+  void sum_by_tree(const Extremes& extremes, double mass_unit);
   Vec3d net_force(const PredictArguments<Real>& own);
 
   GravityMethod method_;
@@ -39,6 +42,8 @@ class CudaGravity final : public gravity::ResidentSolver {
   cudaStream_t stream_;
   gravity::Stats stats_;
   GravityBodies<Real> bodies_;
+  DeviceTree tree_;
+  TreeGravity<Real> walk_;
   DeviceArray<double> acceleration_;  // [3][own] [m/s2]
   DeviceArray<double> scratch_;
   DeviceArray<NetForce> net_forces_;
