@@ -26,7 +26,15 @@ void DeviceTree::build(const BodyArrays& bodies, const gravity::Root& root, doub
   for (auto level = levels_.rbegin(); level != levels_.rend(); ++level) {
     launch_moments(view(), this->bodies(), *level, stream_);
   }
-  launch_sample_scales(view(), this->bodies(), softening, stream_);
+  weigh(softening);
+}
+
+void DeviceTree::weigh(double softening) {
+  heavy_.reserve(1);
+  heavy_.fill_bytes(0, stream_);
+  const std::int64_t coarse = gravity::coarse_limit(count_);
+  launch_list_heavy(view(), coarse, heavy_.data(), stream_);
+  launch_sample_scales(view(), bodies(), heavy_.data(), coarse, softening, stream_);
   for (auto level = levels_.rbegin(); level != levels_.rend(); ++level) {
     launch_combine_scales(view(), *level, stream_);
   }

@@ -25,6 +25,7 @@ class DeviceTree {
  private:
   void sort(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, unsigned first, unsigned own);
   void grow();
+  void weigh(double softening);
   void make_room(unsigned cells);
 
   cudaStream_t stream_;
@@ -39,6 +40,7 @@ class DeviceTree {
   DeviceArray<std::int32_t> next_;
   DeviceArray<Role> role_;
   DeviceArray<double> scale_;
+  DeviceArray<HeavyCells> heavy_;
   DeviceArray<unsigned> children_;
   DeviceArray<std::int32_t> bounds_, bits_;
 };

@@ -3,10 +3,11 @@
 #include <cmath>
 
 #include "cuda/check.hpp"
-#include "cuda/gravity_pairs.cuh"
 #include "cuda/launchers.hpp"
 #include "cuda/tree_kernels.hpp"
+#include "cuda/tree_tiles.cuh"
 #include "gravity/tree/cell_moments.hpp"
+#include "gravity/tree/scale_rules.hpp"
 
 namespace breccia::cuda {
 namespace {
@@ -165,45 +166,48 @@ __global__ void __launch_bounds__(kThreads) set_moments(TreeView tree, SortedBod
 // -----------------------------------------------------------------------------------------------------------
 
 // As gravity/tree/scales.cpp: what sample particles feel from the coarse tree without the cell they are in.
-constexpr unsigned kSamples = 16;
+constexpr unsigned kSamples = gravity::kScaleSamples;
 
-__device__ __forceinline__ bool contains(const Cell& outer, const Cell& inner) {
-  return outer.begin <= inner.begin && outer.end >= inner.end;
+__device__ __forceinline__ bool is_heavy(const Cell& cell, double least, std::int64_t coarse) {
+  return cell.moments.mass >= least && cell.count > coarse;
 }
 
-__device__ __forceinline__ Vec3<float> to_float(Vec3d x) {
-  return {static_cast<float>(x.x), static_cast<float>(x.y), static_cast<float>(x.z)};
+__global__ void __launch_bounds__(kThreads) list_heavy(TreeView tree, std::int64_t coarse, HeavyCells* heavy) {
+  const unsigned c = thread_number();
+  if (c >= tree.count) return;
+  const double least = gravity::kHeavy * tree.cells[0].moments.mass;
+  const Cell& cell = tree.cells[c];
+  if (c > 0 && !is_heavy(cell, least, coarse)) return;
+  for (std::int32_t k = cell.first_child; k < cell.first_child + cell.children; ++k) {
+    if (is_heavy(tree.cells[k], least, coarse)) return;
+  }
+  const unsigned place = atomicAdd(&heavy->count, 1U);
+  if (place < HeavyCells::kMost) heavy->cell[place] = static_cast<std::int32_t>(c);
 }
 
 __device__ __forceinline__ Vec3d sampled_field(const TreeView& tree, const Cell& group, Vec3<float> x,
-                                               float softening_squared, std::int64_t coarse) {
+                                               float softening_squared, std::int64_t coarse, double faint) {
   Vec3d sum{};
   for (std::int32_t c = 0; c != kNoCell;) {
     const Cell& cell = tree.cells[c];
-    const bool own = contains(cell, group);
-    const Vec3d d = group.centre - cell.centre;
-    const double size = cell.radius + 0.5 * group.radius;
-    if (cell.count > coarse && !cell.is_leaf() && (own || size * size >= dot(d, d))) {
+    const bool own = gravity::contains(cell, group);
+    if (cell.count > coarse && !cell.is_leaf() && (own || gravity::opened_for_scale(cell, group, faint))) {
       c = cell.first_child;
       continue;
     }
     if (!own) {
-      const Sym3<double>& s = cell.moments.second;
-      const gravity::Moments<float> moments{
-          static_cast<float>(cell.moments.mass),
-          {static_cast<float>(s.xx), static_cast<float>(s.yy), static_cast<float>(s.zz), static_cast<float>(s.xy),
-           static_cast<float>(s.xz), static_cast<float>(s.yz)}};
-      const Vec3<float> r = x + to_float(d);
-      const Vec3<float> field = gravity::field_of(moments, r, inverse_root(dot(r, r) + softening_squared)).gradient;
-      sum += Vec3d{static_cast<double>(field.x), static_cast<double>(field.y), static_cast<double>(field.z)};
+      DistantCell<float> source;
+      source.set(cell, group.centre);
+      const Vec3<float> r = x - source.position;
+      sum += to_double(gravity::field_of(source.moments, r, inverse_root(dot(r, r) + softening_squared)).gradient);
     }
     c = tree.next[c];
   }
   return sum;
 }
 
-__global__ void __launch_bounds__(kThreads)
-    sample_scales(TreeView tree, SortedBodies sorted, float softening_squared, std::int64_t coarse) {
+__global__ void __launch_bounds__(kThreads) sample_scales(TreeView tree, SortedBodies sorted, const HeavyCells* heavy,
+                                                          float softening_squared, std::int64_t coarse) {
   const unsigned c = thread_number() / kWarp;
   if (c >= tree.count) return;
   const Cell& group = tree.cells[c];
@@ -212,7 +216,12 @@ __global__ void __launch_bounds__(kThreads)
   if (tree.role[c] == Role::kGroup && group.is_target) {
     const std::int64_t sample = lane % kSamples;
     const Vec3d x = PositionOf{sorted}(group.begin + sample * (group.end - group.begin) / kSamples);
-    const Vec3d a = sampled_field(tree, group, to_float(x - group.centre), softening_squared, coarse);
+    double field = 0.0;
+    for (unsigned n = 0; n < heavy->count && n < HeavyCells::kMost; ++n) {
+      field = std::fmax(field, gravity::least_pull(tree.cells[heavy->cell[n]], group));
+    }
+    const Vec3d a = sampled_field(tree, group, to_real<float>(x - group.centre), softening_squared, coarse,
+                                  gravity::kFaint * field);
     least = std::sqrt(dot(a, a));
     for (unsigned step = kWarp / 2; step > 0; step /= 2) {
       least = std::fmin(least, __shfl_down_sync(kAllLanes, least, step));
@@ -275,9 +284,15 @@ void launch_moments(const TreeView& tree, const SortedBodies& sorted, Level leve
   launched();
 }
 
-void launch_sample_scales(const TreeView& tree, const SortedBodies& sorted, double softening, cudaStream_t stream) {
-  BRECCIA_LAUNCH(sample_scales, warps_for(tree.count), dim3(kThreads), 0, stream, tree, sorted,
-                 static_cast<float>(softening * softening), gravity::coarse_limit(sorted.count));
+void launch_list_heavy(const TreeView& tree, std::int64_t coarse_limit, HeavyCells* heavy, cudaStream_t stream) {
+  BRECCIA_LAUNCH(list_heavy, threads_for(tree.count), dim3(kThreads), 0, stream, tree, coarse_limit, heavy);
+  launched();
+}
+
+void launch_sample_scales(const TreeView& tree, const SortedBodies& sorted, const HeavyCells* heavy,
+                          std::int64_t coarse_limit, double softening, cudaStream_t stream) {
+  BRECCIA_LAUNCH(sample_scales, warps_for(tree.count), dim3(kThreads), 0, stream, tree, sorted, heavy,
+                 static_cast<float>(softening * softening), coarse_limit);
   launched();
 }
 

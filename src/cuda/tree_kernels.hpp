@@ -61,8 +61,17 @@ void launch_grow(const TreeView& tree, const SortedBodies& sorted, Level level, 
                  const Splitting& s, cudaStream_t stream);
 /// Masses, centres, second moments and radii of a level whose children have theirs.
 void launch_moments(const TreeView& tree, const SortedBodies& sorted, Level level, cudaStream_t stream);
+/// The heaviest cells of the coarse tree, of whose pull a group's field is at least (gravity/tree/scale_rules.hpp), in
+/// any order. Without mass there is no such pull, and what is beyond the room of the list is left out.
+struct HeavyCells {
+  static constexpr unsigned kMost = 32;  ///< disjoint cells with a sixteenth of the mass, and roundings
+  unsigned count;                        ///< from 0; may come to more than kMost
+  std::int32_t cell[kMost];
+};
+void launch_list_heavy(const TreeView& tree, std::int64_t coarse_limit, HeavyCells* heavy, cudaStream_t stream);
 /// Scales of all groups that hold bodies of this rank; the largest double for other cells.
-void launch_sample_scales(const TreeView& tree, const SortedBodies& sorted, double softening, cudaStream_t stream);
+void launch_sample_scales(const TreeView& tree, const SortedBodies& sorted, const HeavyCells* heavy,
+                          std::int64_t coarse_limit, double softening, cudaStream_t stream);
 /// Scales of the trunk cells of a level from their children.
 void launch_combine_scales(const TreeView& tree, Level level, cudaStream_t stream);
 

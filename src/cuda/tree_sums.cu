@@ -1,8 +1,8 @@
 // Fields of distant cells and near particles, by the interactions of gravity/tree/multipole.hpp and pair_law.hpp.
 #include "cuda/check.hpp"
-#include "cuda/gravity_pairs.cuh"
 #include "cuda/launchers.hpp"
 #include "cuda/tree_kernels.hpp"
+#include "cuda/tree_tiles.cuh"
 
 namespace breccia::cuda {
 namespace {
@@ -12,30 +12,6 @@ using gravity::Cell;
 constexpr unsigned kThreads = kTileSources;
 constexpr unsigned kWarp = 32;
 constexpr unsigned kAllLanes = 0xffffffffU;
-
-template <class Real>
-__device__ __forceinline__ Vec3<Real> to_real(Vec3d x) {
-  return {static_cast<Real>(x.x), static_cast<Real>(x.y), static_cast<Real>(x.z)};
-}
-template <class Real>
-__device__ __forceinline__ Vec3d to_double(Vec3<Real> x) {
-  return {static_cast<double>(x.x), static_cast<double>(x.y), static_cast<double>(x.z)};
-}
-
-// A cell as seen from an origin.
-template <class Real>
-struct DistantCell {
-  Vec3<Real> position;
-  gravity::Moments<Real> moments;
-
-  __device__ __forceinline__ void set(const Cell& cell, Vec3d origin) {
-    position = to_real<Real>(cell.centre - origin);
-    const Sym3<double>& s = cell.moments.second;
-    moments = {static_cast<Real>(cell.moments.mass),
-               {static_cast<Real>(s.xx), static_cast<Real>(s.yy), static_cast<Real>(s.zz), static_cast<Real>(s.xy),
-                static_cast<Real>(s.xz), static_cast<Real>(s.yz)}};
-  }
-};
 
 // --- expansions
 // -------------------------------------------------------------------------------------------------------
@@ -74,17 +50,6 @@ __global__ void __launch_bounds__(kThreads) expand_cells(WalkStep w) {
 
 // --- groups
 // -----------------------------------------------------------------------------------------------------------
-
-constexpr unsigned kTileCells = 64;
-template <class Real>
-struct CellTile {
-  DistantCell<Real> cell[kTileCells];
-};
-template <class Real>
-struct GroupShared {
-  PairTile<Real> pairs;
-  CellTile<Real> cells;
-};
 
 __device__ __forceinline__ Vec3d position_of(const SortedBodies& bodies, unsigned i) {
   return {bodies.position[0][i], bodies.position[1][i], bodies.position[2][i]};
