@@ -9,8 +9,8 @@
 #include "cuda/direct_gravity.hpp"
 #include "gravity/evaluation.hpp"
 #include "gravity/method.hpp"
+#include "gravity/tree/tolerance.hpp"
 #include "gravity/tree/tree.hpp"
-#include "gravity/tree/unsplit.hpp"
 
 namespace breccia::cuda {
 
