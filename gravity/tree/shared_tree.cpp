@@ -7,12 +7,6 @@
 #include "gravity/tree/scales.hpp"
 
 namespace breccia::gravity {
-namespace {
-
-constexpr std::size_t kMostChildren = 8;
-
-}  // namespace
-
 // What all ranks together have in some cells.
 class SharedTree::Census {
  public:
