@@ -6,6 +6,7 @@
 // access.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
@@ -163,6 +164,8 @@ T __shfl_down_sync(unsigned mask, T value, unsigned delta, int line = __builtin_
   const unsigned lane = breccia::cuda_emulation::lane_of_warp();
   return breccia::cuda_emulation::shuffle(mask, value, lane + delta < 32 ? lane + delta : lane, line);
 }
+inline float rsqrtf(float x) { return 1.0F / std::sqrt(x); }
+inline double rsqrt(double x) { return 1.0 / std::sqrt(x); }
 inline int __popc(unsigned x) { return __builtin_popcount(x); }
 inline int __ffs(int x) { return __builtin_ffs(x); }
 inline int __clz(int x) { return x == 0 ? 32 : __builtin_clz(static_cast<unsigned>(x)); }
