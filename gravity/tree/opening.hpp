@@ -81,8 +81,8 @@ BRECCIA_HD auto expandable(const OpeningGeometry<T>& g) {
 /// nobody could predict them.
 template <class T>
 BRECCIA_HD T opening_number(const OpeningGeometry<T>& g) {
-  using std::sqrt;
   using detail::square;
+  using std::sqrt;
   const T b = g.source_radius;
   const T distance = sqrt(g.distance_squared);
   const T nearest = distance - g.target_radius;

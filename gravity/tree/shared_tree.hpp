@@ -17,7 +17,7 @@ struct TopLeaf {
   std::int32_t cell;
   std::int32_t owner;
   bool may_be_divided;  ///< a single group that may be sparse (opening.hpp)
-  double reach;  ///< no group or larger target inside sticks out farther from its centre, |T - centre| + R_T
+  double reach;         ///< no group or larger target inside sticks out farther from its centre, |T - centre| + R_T
 };
 
 /// The top holds the largest cells, some ten thousand, and those that hold particles of several ranks down to single
