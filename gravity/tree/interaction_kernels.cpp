@@ -134,11 +134,41 @@ void expand_task(const ExpansionTask<Real>& task) {
   });
 }
 
+template <bool kGroup>
+void decide_for(const OpeningTask& task) {
+  using V = RegisterPack<double>;
+  const Cell& target = *task.target;
+  for (std::int64_t k = 0; k < task.sources.count; k += V::kLanes) {
+    double dx[V::kLanes] = {}, dy[V::kLanes] = {}, dz[V::kLanes] = {}, radius[V::kLanes] = {}, mass[V::kLanes] = {};
+    const std::int64_t count = task.sources.count - k < V::kLanes ? task.sources.count - k : V::kLanes;
+    for (std::int64_t lane = 0; lane < count; ++lane) {
+      const Cell& source = task.sources.all[task.sources.list[k + lane]];
+      const Vec3d d = target.centre - source.centre;
+      dx[lane] = d.x;
+      dy[lane] = d.y;
+      dz[lane] = d.z;
+      radius[lane] = source.radius;
+      mass[lane] = source.moments.mass;
+    }
+    const Vec3<V> d{V::load(dx), V::load(dy), V::load(dz)};
+    const OpeningGeometry<V> g{dot(d, d), V::load(radius), V::load(mass), V(target.radius), V(task.largest_error)};
+    double number[V::kLanes];
+    if constexpr (kGroup) {
+      opening_number(g).store(number);
+    } else {
+      select(expandable(g), V(static_cast<double>(Opening::kExpand)), V(static_cast<double>(Opening::kOpen))).store(number);
+    }
+    for (std::int64_t lane = 0; lane < count; ++lane) task.how[k + lane] = static_cast<Opening>(static_cast<int>(number[lane]));
+  }
+}
+
+void decide(const OpeningTask& task) { task.target->is_group() ? decide_for<true>(task) : decide_for<false>(task); }
+
 }  // namespace
 
 template <class Real>
 const InteractionKernels<Real>& kernels() {
-  static constexpr InteractionKernels<Real> kKernels{evaluate_task<Real>, expand_task<Real>};
+  static constexpr InteractionKernels<Real> kKernels{evaluate_task<Real>, expand_task<Real>, decide};
   return kKernels;
 }
 template const InteractionKernels<float>& kernels<float>();

@@ -19,18 +19,60 @@ constexpr int kSamples = 16;
 // Cells are opened where (b + R)/D exceeds this; three quarters of the fields then are right to a percent.
 constexpr double kScaleOpening = 1.0;
 
+// Cells of this share of the mass tell how strong the field is at least.
+constexpr double kHeavy = 1.0 / 16.0;
+// A cell whose field at its own radius is weaker by this factor than that is opened only from deep inside: around a body,
+// debris fills many wide cells of little mass.
+constexpr double kFaint = 0.1;
+constexpr double kDeepInside = 0.5;
+
 struct Sampling {
   Workspace<float> work;
   std::vector<std::int32_t> stack;
   double sums[3][kSamples];
 };
 
+double square(double x) { return x * x; }
+
+// Cells of the coarse tree only: all ranks know them.
+std::vector<std::int32_t> heavy_cells(const Tree& tree) {
+  if (tree.cells.empty()) return {};
+  const std::int64_t coarse = coarse_limit(tree.all_particles);
+  const double least = kHeavy * tree.cell(0).moments.mass;
+  std::vector<std::int32_t> heavy, stack{0};
+  while (!stack.empty()) {
+    const std::int32_t c = stack.back();
+    stack.pop_back();
+    const Cell& cell = tree.cell(c);
+    bool divided = false;
+    for (std::int32_t k = cell.first_child; k < cell.first_child + cell.children; ++k) {
+      if (tree.cell(k).moments.mass < least || tree.cell(k).count <= coarse) continue;
+      stack.push_back(k);
+      divided = true;
+    }
+    if (!divided) heavy.push_back(c);
+  }
+  return heavy;
+}
+
+// The strongest pull of a heavy cell, from where it is farthest.
+double least_field(const Tree& tree, std::span<const std::int32_t> heavy, const Cell& group) {
+  double field = 0.0;
+  for (const std::int32_t c : heavy) {
+    const Cell& cell = tree.cell(c);
+    const Vec3d d = group.centre - cell.centre;
+    field = std::max(field, cell.moments.mass / square(std::sqrt(dot(d, d)) + cell.radius + group.radius));
+  }
+  return field;
+}
+
 bool contains(const Cell& outer, const Cell& inner) {
   return outer.end > outer.begin && outer.begin <= inner.begin && outer.end >= inner.end;
 }
 
 // Cells of the coarse tree as the group sees them; the coarse cell it belongs to is left out.
-void list_coarse_cells(const Tree& tree, const Cell& group, Sampling& s) {
+void list_coarse_cells(const Tree& tree, std::span<const std::int32_t> heavy, const Cell& group, Sampling& s) {
+  const double faint = kFaint * least_field(tree, heavy, group);
   const std::int64_t coarse = coarse_limit(tree.all_particles);
   s.work.cells.clear();
   s.stack.assign(1, 0);
@@ -41,8 +83,10 @@ void list_coarse_cells(const Tree& tree, const Cell& group, Sampling& s) {
     const bool own = contains(cell, group);
     if (cell.count > coarse && !cell.is_leaf()) {
       const Vec3d d = group.centre - cell.centre;
-      const double size = cell.radius + 0.5 * group.radius;
-      if (own || size * size >= kScaleOpening * kScaleOpening * dot(d, d)) {
+      const double d2 = dot(d, d);
+      const bool near = square(cell.radius + 0.5 * group.radius) >= square(kScaleOpening) * d2;
+      const bool strong = cell.moments.mass >= faint * square(cell.radius) || d2 < square(kDeepInside * cell.radius);
+      if (own || (near && strong)) {
         for (int k = 0; k < cell.children; ++k) s.stack.push_back(cell.first_child + k);
         continue;
       }
@@ -51,8 +95,9 @@ void list_coarse_cells(const Tree& tree, const Cell& group, Sampling& s) {
   }
 }
 
-double scale_of(const Tree& tree, const Cell& group, double softening, Sampling& s) {
-  list_coarse_cells(tree, group, s);
+double scale_of(const Tree& tree, std::span<const std::int32_t> heavy, const Cell& group, double softening,
+                Sampling& s) {
+  list_coarse_cells(tree, heavy, group, s);
   double position[3][kSamples];
   double mass[kSamples] = {};
   for (int k = 0; k < kSamples; ++k) {
@@ -91,13 +136,20 @@ std::vector<double> acceleration_scales(const Tree& tree, std::span<const Cell> 
   std::vector<std::int32_t> targets = tree.groups();
   std::erase_if(targets, [&](std::int32_t g) { return !tree.cell(g).is_target; });
   std::vector<double> scales(tree.cells.size(), std::numeric_limits<double>::max());
+  const std::vector<std::int32_t> heavy = heavy_cells(tree);
   std::vector<Sampling> sampling(static_cast<std::size_t>(threads));
 #pragma omp parallel for num_threads(threads) schedule(dynamic, 16)
   for (std::size_t g = 0; g < targets.size(); ++g) {
     const Cell& group = tree.cell(targets[g]);
-    double scale = scale_of(tree, group, softening, sampling[static_cast<std::size_t>(omp_get_thread_num())]);
+    double scale = scale_of(tree, heavy, group, softening, sampling[static_cast<std::size_t>(omp_get_thread_num())]);
     for (const Cell& other : others) scale = std::max(scale, pull_of_whole(other, group));
     scales[static_cast<std::size_t>(targets[g])] = scale;
+  }
+  for (std::size_t i = 0; i < tree.cells.size(); ++i) {  // parents come first
+    const Cell& cell = tree.cells[i];
+    for (std::int32_t c = 0; c < cell.children && cell.is_group(); ++c) {
+      scales[static_cast<std::size_t>(cell.first_child + c)] = scales[i];
+    }
   }
   take_least_of_children(tree, scales.size(), scales);
   return scales;

@@ -93,6 +93,19 @@ struct NumericsParameters {
   LiteralSwitches literal;
 };
 
+enum class BalanceMode {
+  kOff,     ///< slabs stay as they were cut at the start
+  kAlways,  ///< cut anew at every gravity window
+  kAuto     ///< cut anew where the work has become uneven
+};
+
+/// How the work is shared by ranks.
+struct ParallelParameters {
+  BalanceMode balance = BalanceMode::kAuto;
+  double imbalance = 1.05;  ///< largest over mean work of the ranks that kAuto lets be
+  std::optional<int> axis;  ///< 0, 1, 2: slabs across x, y, z; none: across the longest extent of the matter
+};
+
 struct TimeParameters {
   double end = 0.0;            ///< [s]
   std::optional<double> step;  ///< fixed step [s]; none: adaptive
@@ -123,6 +136,7 @@ struct Scene {
   EffectSwitches effects;
   GravityParameters gravity;
   NumericsParameters numerics;
+  ParallelParameters parallel;
   TimeParameters time;
   OutputParameters output;
 };

@@ -46,6 +46,9 @@ class HostEngine final : public Engine {
   [[nodiscard]] material::FlawLists flaws() const override;
   void restore(const EngineState& state, const material::FlawLists& flaws) override;
   void sort() override;
+  [[nodiscard]] const mpi::Slabs& slabs() const override { return slabs_; }
+  [[nodiscard]] mpi::PlaneWork work(std::span<const double> more) const override;
+  void cut(const mpi::Slabs& slabs) override;
   void scatter(double half_step) override;
   void update_grid(double kick) override;
   void gather(double step) override;
@@ -96,12 +99,9 @@ class HostEngine final : public Engine {
     if (timeline_ != nullptr) timeline_->add(name, lane, begin, end);
   }
 
-  // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp).
+  // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
   void settle(std::vector<Placement> placements);
-  void settle_in_slabs(std::vector<Placement> placements);
-  [[nodiscard]] bool unbalanced(std::size_t particles) const;
   void choose_slabs(std::span<const Placement> placements);
-  [[nodiscard]] int longest_axis(std::span<const Placement> placements) const;
   [[nodiscard]] std::vector<Placement> place_all() const;
   void migrate(std::vector<Placement>& placements);
   [[nodiscard]] SortedPlacements separate(std::vector<Placement> placements);
@@ -177,7 +177,6 @@ class HostEngine final : public Engine {
   double smallest_mass_ = 0.0;
   std::uint64_t strayed_packs_ = 0;  // seen since the last sorting; reported there, on all ranks at once
 
-  bool slabs_chosen_ = false;
   mpi::Slabs slabs_;
   mpi::StandingRequests<BlockRequest> block_requests_;
   OrderedSums ordered_;  // of a reproducible run

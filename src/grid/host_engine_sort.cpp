@@ -62,56 +62,11 @@ void HostEngine<P>::sort() {
 
 template <class P>
 void HostEngine<P>::settle(std::vector<Placement> placements) {
-  if (!slabs_chosen_ || unbalanced(placements.size())) choose_slabs(placements);
-  settle_in_slabs(std::move(placements));
-}
-
-template <class P>
-void HostEngine<P>::settle_in_slabs(std::vector<Placement> placements) {
   migrate(placements);
   arrange(separate(std::move(placements)));
   connect_tiles();
   report_ = {};
   gathers_ = 0;
-}
-
-template <class P>
-bool HostEngine<P>::unbalanced(std::size_t particles) const {
-  // Counts, not clocks: a run repeats bit for bit.
-  constexpr double kAllowed = 1.2;
-  const auto mine = static_cast<std::uint64_t>(particles);
-  const auto mean = static_cast<double>(comm_.sum(mine)) / comm_.size();
-  return comm_.size() > 1 && static_cast<double>(comm_.max(mine)) > kAllowed * mean;
-}
-
-template <class P>
-void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
-  const int axis = slabs_chosen_ ? slabs_.axis() : longest_axis(placements);
-  mpi::PlaneWork work;
-  for (const Placement& p : placements) ++work[floor_div4(p.node[axis])];
-  slabs_ = mpi::Slabs::balanced(axis, work, comm_);
-  slabs_chosen_ = true;
-}
-
-template <class P>
-int HostEngine<P>::longest_axis(std::span<const Placement> placements) const {
-  // Slabs across the longest extent of the matter share the fewest nodes.
-  int longest = 0;
-  std::int64_t extent = -1;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::int32_t low = INT32_MAX;
-    std::int32_t high = INT32_MIN;
-    for (const Placement& p : placements) {
-      low = std::min(low, p.node[axis]);
-      high = std::max(high, p.node[axis]);
-    }
-    const std::int64_t length = std::int64_t{comm_.max(high)} - comm_.min(low);
-    if (length > extent) {
-      extent = length;
-      longest = axis;
-    }
-  }
-  return longest;
 }
 
 template <class P>

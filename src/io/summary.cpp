@@ -89,6 +89,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["stages"] = stages_json(summary.stages);
   json["halo"] = halo_json(summary.halo);
   json["gravity"] = summary.gravity;
+  json["slabs"] = summary.slabs;
   json["versions"] = versions_json();
   json["machine"] = machine_json();
   json["scene"] = scene_json(summary.scene);

@@ -55,6 +55,7 @@ struct RunSummary {
   std::vector<StageTiming> stages;
   std::optional<HaloTiming> halo;        ///< none on one rank
   nlohmann::json gravity;                ///< what its evaluations came to; null without self-gravity
+  nlohmann::json slabs;                  ///< axis, balance of the ranks' work, bytes of the halo at the end
   std::vector<ResolvedKey> scene;        ///< every key as resolved
   std::vector<std::string> unused_keys;  ///< keys that had no effect in this run
 };

@@ -126,6 +126,8 @@ class Output {
     last_row_.time = loop.time();
     last_row_.step = loop.step();
     last_row_.dt = loop.dt();
+    last_row_.imbalance = loop.balance().imbalance;
+    last_row_.recuts = loop.balance().recuts;
     last_row_.wall_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start_).count();
     diagnostics_.write(last_row_);
   }
@@ -206,6 +208,30 @@ void print_profile(const StageTimers& timers, const std::string& decision, const
              number("pairs"), number("cell_interactions"), number("expansions"), 1e-6 * number("bytes_sent"));
   fmt::print("  {} boxes; at most {:.3g} cells and {:.3g} particles of other ranks' trees; net force removed {:.1e}\n",
              gravity["boxes"].get<int>(), number("cells_imported"), number("particles_imported"), number("net_force"));
+}
+
+nlohmann::json slabs_json(const TimeLoop& loop, const mpi::Comm& comm) {
+  const BalanceState& balance = loop.balance();
+  const auto windows = static_cast<double>(balance.windows);
+  const std::uint64_t bytes = loop.engine().stats().halo_bytes_per_step;
+  return {{"axis", std::string(1, "xyz"[loop.engine().slabs().axis()])},
+          {"imbalance_mean", balance.windows > 0 ? balance.imbalance_sum / windows : 1.0},
+          {"imbalance_max", balance.imbalance_max},
+          {"imbalance", balance.imbalance},
+          {"recuts", balance.recuts},
+          {"windows", balance.windows},
+          {"halo_bytes_mean", static_cast<double>(comm.sum(bytes)) / comm.size()},
+          {"halo_bytes_max", comm.max(bytes)}};
+}
+
+void print_slabs(const nlohmann::json& slabs) {
+  const auto number = [&](const char* key) { return slabs[key].get<double>(); };
+  fmt::print(
+      "slabs across {}: imbalance of the counted work {:.3f} on average, {:.3f} at most; cut anew {} times in {} "
+      "windows; {:.3g} kB of halo sent by a rank in a step, {:.3g} at most\n",
+      slabs["axis"].get<std::string>(), number("imbalance_mean"), number("imbalance_max"),
+      slabs["recuts"].get<std::uint64_t>(), slabs["windows"].get<std::uint64_t>(), 1e-3 * number("halo_bytes_mean"),
+      1e-3 * number("halo_bytes_max"));
 }
 
 std::filesystem::path default_folder(const Scene& scene) { return std::filesystem::path("out") / scene.name; }
@@ -384,11 +410,13 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   }
   summary.halo = halo_timing(loop.engine(), comm);
   summary.gravity = loop.gravity_record().summary(comm);
+  summary.slabs = slabs_json(loop, comm);
   summary.scene = options.resolved;
   io::write_summary(options.out / "summary.json", summary, comm);
   if (options.profile && comm.is_root()) {
     print_profile(loop.timers(), loop.gravity_record().decision(), summary.gravity, wall);
     if (summary.halo) print_halo(*summary.halo);
+    if (comm.size() > 1) print_slabs(summary.slabs);
   }
   if (!options.timeline.empty()) write_timeline(options.timeline, timeline, timeline_start, comm);
 }

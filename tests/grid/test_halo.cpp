@@ -1,39 +1,10 @@
-// Slabs and halo exchange: every node gets the sum of what all ranks put into it, and all ranks then see one value.
+// Halo exchange: every node gets the sum of what all ranks put into it, and all ranks then see one value.
 #include <gtest/gtest.h>
 
-#include <numeric>
-
 #include "mpi/halo.hpp"
-#include "mpi/slabs.hpp"
 
 namespace breccia::mpi {
 namespace {
-
-TEST(Slabs, EveryPlaneHasOneOwnerAndTheWorkIsEven) {
-  const Comm comm;
-  PlaneWork work;
-  for (std::int32_t plane = -50; plane < 50; ++plane) work[plane] = 10;  // the same on every rank
-  const Slabs slabs = Slabs::balanced(0, work, comm);
-  std::vector<std::uint64_t> share(static_cast<std::size_t>(comm.size()), 0);
-  int previous = 0;
-  for (std::int32_t plane = -60; plane < 60; ++plane) {
-    const int owner = slabs.owner(plane);
-    ASSERT_GE(owner, previous);  // slabs lie in the order of the ranks
-    ASSERT_LT(owner, comm.size());
-    previous = owner;
-    if (work.contains(plane)) share[static_cast<std::size_t>(owner)] += work[plane];
-  }
-  // 100 equal planes: no slab is off its share by more than one plane.
-  for (const std::uint64_t s : share) EXPECT_NEAR(static_cast<double>(s), 1000.0 / comm.size(), 10.0);
-}
-
-TEST(Slabs, MoreRanksThanPlanesLeaveRanksEmpty) {
-  const Comm comm;
-  const Slabs slabs = Slabs::balanced(1, {{7, 1000}}, comm);
-  std::vector<int> planes(static_cast<std::size_t>(comm.size()), 0);
-  ++planes[static_cast<std::size_t>(slabs.owner(7))];
-  EXPECT_EQ(std::accumulate(planes.begin(), planes.end(), 0), 1);
-}
 
 // Every rank holds nodes 0 .. n-1; node i belongs to rank i % size and is touched by all.
 class Halo : public testing::Test {
