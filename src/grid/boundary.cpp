@@ -76,10 +76,10 @@ template void BoundarySet::apply(std::span<const WallNode>, float*) const;
 template void BoundarySet::apply(std::span<const WallNode>, double*) const;
 
 Vec3d BoundarySet::into_period(Vec3d x) const {
+  const Vec3d lengths = period_length();
   for (int axis = 0; axis < 3; ++axis) {
-    const std::int32_t blocks = periodicity_.blocks[static_cast<std::size_t>(axis)];
-    if (blocks == 0) continue;
-    const double length = blocks * kBlockWidth * cell_;
+    const double length = component(std::as_const(lengths), axis);
+    if (length == 0.0) continue;
     const double start = component(std::as_const(period_start_), axis);
     double& value = component(x, axis);
     value -= length * std::floor((value - start) / length);

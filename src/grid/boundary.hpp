@@ -40,6 +40,12 @@ class BoundarySet {
   }
   /// The position moved into the period of the periodic axes.
   [[nodiscard]] Vec3d into_period(Vec3d x) const;
+  /// Where the period of each axis starts, and its length; 0: it does not repeat [m].
+  [[nodiscard]] Vec3d period_start() const { return period_start_; }
+  [[nodiscard]] Vec3d period_length() const {
+    const auto length = [&](std::size_t axis) { return periodicity_.blocks[axis] * kBlockWidth * cell_; };
+    return {length(0), length(1), length(2)};
+  }
 
  private:
   struct WallNode {

@@ -81,6 +81,8 @@ void TimeLoop::make_solver(const ResolvedEffects& effects, int threads) {
       .error = scene_.gravity.error,
       .opening = scene_.gravity.opening};
   solver_ = gravity::make_solver(effects.gravity_method, parameters, comm_, threads);
+  auto* particles = dynamic_cast<gravity::ResidentParticles*>(engine_.get());
+  if (particles != nullptr) resident_ = particles->make_resident_solver(effects.gravity_method, parameters);
 }
 
 void TimeLoop::record(Timeline& timeline) {
@@ -171,19 +173,22 @@ double TimeLoop::stable_step_now() {
 }
 
 void TimeLoop::evaluate_gravity() {
+  const double time = window_.prediction_time(dt_);
   timers_("gravity", [&] {
+    if (resident_) return resident_->evaluate_and_hold(time);
     std::vector<Vec3d> position;
     std::vector<double> mass;
-    engine_->predict(window_.prediction_time(dt_), position, mass);
+    engine_->predict(time, position, mass);
     std::vector<Vec3d> acceleration(position.size());
     solver_->evaluate({position, mass}, acceleration, {});
     engine_->hold_gravity(acceleration);
   });
-  const gravity::Phases& phases = solver_->last().phases;
+  const gravity::Stats& stats = resident_ ? resident_->last() : solver_->last();
+  const gravity::Phases& phases = stats.phases;
   for (std::size_t k = 0; k < phases.seconds.size(); ++k) {
     if (phases.seconds[k] > 0.0) timers_.add_part("gravity", gravity::kPhaseNames[k], phases.seconds[k]);
   }
-  gravity_record_.add(solver_->last());
+  gravity_record_.add(stats);
 }
 
 void TimeLoop::check() {

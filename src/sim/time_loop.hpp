@@ -5,6 +5,7 @@
 #include <functional>
 #include <memory>
 
+#include "gravity/resident.hpp"
 #include "gravity/solver.hpp"
 #include "gravity/window.hpp"
 #include "grid/engine.hpp"
@@ -73,7 +74,8 @@ class TimeLoop {
   bool adaptive_;
   mpi::Comm comm_;
   std::unique_ptr<grid::Engine> engine_;
-  std::unique_ptr<gravity::Solver> solver_;  // null: no self-gravity
+  std::unique_ptr<gravity::Solver> solver_;            // null: no self-gravity
+  std::unique_ptr<gravity::ResidentSolver> resident_;  // in its place where the engine can evaluate gravity itself
   gravity::Window window_;
   GravityRecord gravity_record_;
   Guard guard_;
