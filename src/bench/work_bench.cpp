@@ -58,7 +58,7 @@ std::unique_ptr<grid::Engine> make_engine(const WorkState& state, Precision prec
   scene.numerics.lone_without_grid = state.lone_without_grid;
   scene.effects.damage = Switch::kOn;
   for (BodyParameters& body : scene.bodies) body.damage = state.damage;
-  ParticleArrays particles = make_state(state.matter, scene);
+  ParticleArrays particles = make_state(state.matter, scene, mpi::Comm(MPI_COMM_SELF));
   for (Vec3d& x : particles.position) x = state.spread * x;
   dt = *scene.time.step;
   const mpi::Comm self(MPI_COMM_SELF);
