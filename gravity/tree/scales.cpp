@@ -117,6 +117,12 @@ std::vector<double> acceleration_scales(const Tree& tree, std::span<const Cell> 
     for (const Cell& other : others) scale = std::max(scale, pull_of_whole(other, group));
     scales[static_cast<std::size_t>(targets[g])] = scale;
   }
+  for (std::size_t i = 0; i < tree.cells.size(); ++i) {  // parents come first
+    const Cell& cell = tree.cells[i];
+    for (std::int32_t c = 0; c < cell.children && cell.is_group(); ++c) {
+      scales[static_cast<std::size_t>(cell.first_child + c)] = scales[i];
+    }
+  }
   take_least_of_children(tree, scales.size(), scales);
   return scales;
 }

@@ -32,6 +32,9 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   [[nodiscard]] material::FlawLists flaws() const override;
   void restore(const EngineState& state, const material::FlawLists& flaws) override;
   void sort() override;
+  [[nodiscard]] const mpi::Slabs& slabs() const override { return slabs_; }
+  [[nodiscard]] mpi::PlaneWork work(std::span<const double> more) const override;
+  void cut(const mpi::Slabs& slabs) override;
   void scatter(double half_step) override;
   void update_grid(double kick) override;
   void gather(double step) override;
@@ -71,7 +74,6 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
             const std::vector<std::vector<std::byte>>& messages);
   [[nodiscard]] std::vector<std::vector<std::byte>> messages_of(const std::vector<std::vector<unsigned>>& leaving,
                                                                 std::span<const grid::BlockKey> keys);
-  void cut_anew();
   void save_flaws(EngineState& state) const;
   void switch_damage_off();
   [[nodiscard]] std::vector<Vec3d> positions() const;

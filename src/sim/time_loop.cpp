@@ -1,6 +1,7 @@
 #include "sim/time_loop.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "sim/setup.hpp"
 
@@ -9,6 +10,16 @@ namespace {
 
 double step_at_rest(const Scene& scene, const ResolvedEffects& effects) {
   return stable_step(scene, initial_speeds(scene, effects.material.shear), effects.material.viscosity).seconds;
+}
+
+LostWork sum_of(const std::vector<LostWork>& ranks) {
+  LostWork sum;
+  for (const LostWork& work : ranks) {
+    sum.plastic += work.plastic;
+    sum.viscous += work.viscous;
+    sum.clamped += work.clamped;
+  }
+  return sum;
 }
 
 }  // namespace
@@ -21,12 +32,14 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
       comm_(comm),
       engine_(make_loaded_engine(scene, effects, threads, comm, make)),
       window_(scene.gravity.interval),
-      guard_(scene, step_at_rest(scene, effects), comm) {
+      guard_(scene, step_at_rest(scene, effects), comm),
+      balance_(scene, comm) {
   const grid::SignalSpeeds speeds = engine_->signal_speeds();
   dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
   set_sort_interval(speeds.particle * dt_ / scene_.cell);
   make_solver(effects, threads);
   if (solver_) evaluate_gravity();
+  balance_ranks();
   engine_->kick_velocities(0.5 * dt_);
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * dt_); });
 }
@@ -40,6 +53,7 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const Eng
       engine_(make_restored_engine(scene, effects, engine, threads, comm, make)),
       window_(scene.gravity.interval),
       guard_(scene, step_at_rest(scene, effects), comm),
+      balance_(scene, comm),
       time_(state.time),
       dt_(state.dt),
       previous_dt_(state.previous_dt),
@@ -49,12 +63,11 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const Eng
   const auto rank = static_cast<std::size_t>(comm.rank());
   if (state.lost.size() == static_cast<std::size_t>(comm.size())) {
     lost_ = state.lost[rank];
-  } else if (comm.is_root()) {
-    for (const LostWork& work : state.lost) {
-      lost_.plastic += work.plastic;
-      lost_.viscous += work.viscous;
-      lost_.clamped += work.clamped;
-    }
+    balance_.restore(state.balance);
+  } else {
+    if (comm.is_root()) lost_ = sum_of(state.lost);
+    // Gravity was evaluated elsewhere: what it cost is counted from the next window on.
+    timers_("balance", [&] { balance_.at_window_start(*engine_, nullptr); });
   }
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
 }
@@ -72,10 +85,19 @@ void TimeLoop::make_solver(const ResolvedEffects& effects, int threads) {
   if (particles != nullptr) resident_ = particles->make_resident_solver(effects.gravity_method, parameters);
 }
 
-LoopState TimeLoop::state() const { return {time_, dt_, previous_dt_, step_, sort_interval_, comm_.allgather(lost_)}; }
+void TimeLoop::record(Timeline& timeline) {
+  timeline_ = &timeline;
+  engine_->record(&timeline);
+  timers_.record(&timeline);
+}
+
+LoopState TimeLoop::state() const {
+  return {time_, dt_, previous_dt_, step_, sort_interval_, comm_.allgather(lost_), balance_.state()};
+}
 
 void TimeLoop::run(const Visit& at_time_step, const Visit& at_window_start) {
   for (;;) {
+    if (timeline_ != nullptr) timeline_->begin_step();
     // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
     timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
     if (!at_time_step(*this)) return check();
@@ -114,16 +136,40 @@ void TimeLoop::between_steps() {
   const double largest_move = comm_.max(passes.largest_move);
   timers_("damage", [&] { engine_->finish_damage(); });
   timers_("sort", [&] { engine_->sort(); });
-  if (window_.due()) begin_window();
+  if (window_.due()) {
+    begin_window();
+  } else if (adaptive_) {
+    shorten_step();
+  }
   set_sort_interval(largest_move * dt_ / previous_dt_);
 }
 
 void TimeLoop::begin_window() {
   if (adaptive_) {
-    timers_("time step", [&] { dt_ = stable_step(scene_, engine_->signal_speeds(), viscosity_).seconds; });
+    dt_ = stable_step_now();
     guard_.check_step(dt_, *engine_);
   }
   if (solver_) evaluate_gravity();
+  balance_ranks();
+}
+
+void TimeLoop::balance_ranks() {
+  timers_("balance", [&] { balance_.at_window_start(*engine_, solver_.get()); });
+}
+
+// Inside a window dt stays, for which gravity was predicted, unless a shock has used up a quarter of the margin that
+// cfl leaves.
+void TimeLoop::shorten_step() {
+  const double stable = stable_step_now(), limit = stable / scene_.time.cfl;
+  if (dt_ <= stable + 0.25 * (limit - stable)) return;
+  dt_ = stable;
+  guard_.check_step(dt_, *engine_);
+}
+
+double TimeLoop::stable_step_now() {
+  double step = 0.0;
+  timers_("time step", [&] { step = stable_step(scene_, engine_->signal_speeds(), viscosity_).seconds; });
+  return step;
 }
 
 void TimeLoop::evaluate_gravity() {
@@ -158,8 +204,11 @@ LostWork TimeLoop::lost_work() const {
 }
 
 void TimeLoop::set_sort_interval(double cells_per_step) {
-  // Particles may drift one cell between sortings; half of it is left for those that speed up meanwhile.
-  const double steps = cells_per_step > 0.0 ? 0.5 / cells_per_step : scene_.numerics.sort_interval;
+  // Particles may drift one cell between sortings: half of it with their speed and the uniform field, v n + g n^2/2 =
+  // 1/2 in cells and steps, and half is left for what else speeds them up meanwhile.
+  const double field = std::sqrt(dot(scene_.gravity.uniform, scene_.gravity.uniform)) * dt_ * dt_ / scene_.cell;
+  const double rate = cells_per_step + std::sqrt(cells_per_step * cells_per_step + field);
+  const double steps = rate > 0.0 ? 1.0 / rate : scene_.numerics.sort_interval;
   sort_interval_ = std::clamp(static_cast<int>(std::min(steps, 1e6)), 1, scene_.numerics.sort_interval);
 }
 
