@@ -6,10 +6,6 @@
 namespace breccia::gravity::BRECCIA_ISA {
 namespace {
 
-// Square of the distance below which two particles without softening count as one: q^3 must stay finite.
-template <class Real>
-constexpr Real kCoincidentSquared = std::is_same_v<Real, float> ? Real(1e-24) : Real(1e-100);
-
 template <class V, bool kPotential>
 void add_far(const LocalExpansion<double>& far, const Relative<typename V::Scalar>& targets, std::int64_t padded,
              const Sums& sums) {
@@ -68,8 +64,8 @@ void add_particles(const GroupTask<typename V::Scalar>& task, const Relative<typ
                    std::int64_t padded, typename V::Scalar* memory, const Sums& sums) {
   using Real = typename V::Scalar;
   const V softening_squared(task.softening_squared);
-  if (task.softening_squared <= kCoincidentSquared<Real>) {
-    const NewtonPair<V, true> pair{softening_squared, V(kCoincidentSquared<Real>)};
+  if (task.softening_squared <= kCoincidentPair<Real>) {
+    const NewtonPair<V, true> pair{softening_squared, V(kCoincidentPair<Real>)};
     add_ranges<V, kLow, kPotential>(task, targets, padded, memory, pair, sums);
   } else {
     const NewtonPair<V, false> pair{softening_squared, V{}};
@@ -134,11 +130,41 @@ void expand_task(const ExpansionTask<Real>& task) {
   });
 }
 
+template <bool kGroup>
+void decide_for(const OpeningTask& task) {
+  using V = RegisterPack<double>;
+  const Cell& target = *task.target;
+  for (std::int64_t k = 0; k < task.sources.count; k += V::kLanes) {
+    double dx[V::kLanes] = {}, dy[V::kLanes] = {}, dz[V::kLanes] = {}, radius[V::kLanes] = {}, mass[V::kLanes] = {};
+    const std::int64_t count = task.sources.count - k < V::kLanes ? task.sources.count - k : V::kLanes;
+    for (std::int64_t lane = 0; lane < count; ++lane) {
+      const Cell& source = task.sources.all[task.sources.list[k + lane]];
+      const Vec3d d = target.centre - source.centre;
+      dx[lane] = d.x;
+      dy[lane] = d.y;
+      dz[lane] = d.z;
+      radius[lane] = source.radius;
+      mass[lane] = source.moments.mass;
+    }
+    const Vec3<V> d{V::load(dx), V::load(dy), V::load(dz)};
+    const OpeningGeometry<V> g{dot(d, d), V::load(radius), V::load(mass), V(target.radius), V(task.largest_error)};
+    double number[V::kLanes];
+    if constexpr (kGroup) {
+      opening_number(g).store(number);
+    } else {
+      select(expandable(g), V(static_cast<double>(Opening::kExpand)), V(static_cast<double>(Opening::kOpen))).store(number);
+    }
+    for (std::int64_t lane = 0; lane < count; ++lane) task.how[k + lane] = static_cast<Opening>(static_cast<int>(number[lane]));
+  }
+}
+
+void decide(const OpeningTask& task) { task.target->is_group() ? decide_for<true>(task) : decide_for<false>(task); }
+
 }  // namespace
 
 template <class Real>
 const InteractionKernels<Real>& kernels() {
-  static constexpr InteractionKernels<Real> kKernels{evaluate_task<Real>, expand_task<Real>};
+  static constexpr InteractionKernels<Real> kKernels{evaluate_task<Real>, expand_task<Real>, decide};
   return kKernels;
 }
 template const InteractionKernels<float>& kernels<float>();

@@ -6,6 +6,7 @@
 
 #include "breccia/linalg.hpp"
 #include "gravity/tree/cell.hpp"
+#include "gravity/tree/opening.hpp"
 
 namespace breccia::gravity {
 
@@ -65,11 +66,20 @@ struct ExpansionTask {
   LocalExpansion<double>* expansion;
 };
 
+/// How each of the cells is to be taken for a target (opening.hpp).
+struct OpeningTask {
+  CellRefs sources;
+  const Cell* target;
+  double largest_error;
+  Opening* how;  ///< for each source; for a target that is no group kExpand or kOpen
+};
+
 /// The inner loops as compiled for one instruction set.
 template <class Real>
 struct InteractionKernels {
   void (*evaluate_group)(const GroupTask<Real>& task);
   void (*expand)(const ExpansionTask<Real>& task);
+  void (*decide)(const OpeningTask& task);
 };
 
 /// The copy this processor runs fastest (breccia::active_isa).

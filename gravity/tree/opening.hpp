@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstdint>
 
+#include "breccia/math.hpp"
 #include "gravity/tree/cell.hpp"
 
 namespace breccia::gravity {
@@ -20,51 +21,76 @@ inline constexpr double kOctupole = 0.1;
 /// A cell of so few particles costs less as particles.
 inline constexpr std::int64_t kFewParticles = 2;
 
-enum class Opening {
+enum class Opening : std::uint8_t {
   kOpen,    ///< its children, or its particles
   kWhole,   ///< monopole and quadrupole at each target
   kExpand,  ///< Taylor expansion around the centre of the targets
 };
 
+/// What the rules ask of a source and a target; T: double, or a pack of sources.
+template <class T>
+struct OpeningGeometry {
+  T distance_squared;  ///< of the centres
+  T source_radius, source_mass;
+  T target_radius;
+  T largest_error;
+};
+
 namespace detail {
-BRECCIA_HD double square(double x) { return x * x; }
+template <class T>
+BRECCIA_HD T square(T x) {
+  return x * x;
+}
 
 /// All terms of the fourth order, x = (b + R)/D bounding the ratio of one to the next, and the octupole:
-/// M (x^4/(1-x)^2 + kOctupole (b/D)^3)/D^2 < largest_error, for x < 1; here without a division.
-BRECCIA_HD bool expandable(const Cell& source, double size, double distance, double largest_error) {
-  const double b = source.radius;
-  const double d2 = distance * distance;
-  const double rest = square(distance - size);
-  return source.moments.mass * (square(square(size)) * distance + kOctupole * (b * b * b) * rest) <
-         largest_error * rest * (d2 * d2 * distance);
+/// M (x^4/(1-x)^2 + kOctupole (b/D)^3)/D^2 < largest_error; here without a division.
+template <class T>
+BRECCIA_HD auto expandable(const OpeningGeometry<T>& g, T distance) {
+  const T b = g.source_radius;
+  const T size = b + g.target_radius;
+  const T d2 = g.distance_squared;
+  const T rest = square(distance - size);
+  const auto converges = size < T(kLargestOpening) * distance;
+  const auto small = g.source_mass * (square(square(size)) * distance + T(kOctupole) * (b * b * b) * rest) <
+                     g.largest_error * rest * (d2 * d2 * distance);
+  return converges & small;
 }
 }  // namespace detail
 
-/// Whether `source` may be expanded around the centre of `target`.
-BRECCIA_HD bool expandable(const Cell& source, const Cell& target, double largest_error) {
-  const Vec3d d = target.centre - source.centre;
-  const double d2 = dot(d, d);
-  const double size = source.radius + target.radius;
-  if (size * size >= detail::square(kLargestOpening) * d2) return false;
-  return detail::expandable(source, size, std::sqrt(d2), largest_error);
+/// Whether the source may be expanded around the centre of the target.
+template <class T>
+BRECCIA_HD auto expandable(const OpeningGeometry<T>& g) {
+  using std::sqrt;
+  return detail::expandable(g, sqrt(g.distance_squared));
 }
 
-/// The cheapest way to take `source` for the particles of the group `target`. Seen whole, what is missing is the
-/// octupole at the nearest of them: kOctupole M b^3/(D - R)^5 < largest_error.
-BRECCIA_HD Opening opening(const Cell& source, const Cell& target, double largest_error) {
+/// The cheapest way to take the source for the particles of a group, as the number of an Opening. Seen whole, what is
+/// missing is the octupole at the nearest of them: kOctupole M b^3/(D - R)^5 < largest_error. Without branches, as
+/// nobody could predict them.
+template <class T>
+BRECCIA_HD T opening_number(const OpeningGeometry<T>& g) {
+  using std::sqrt;
+  using detail::square;
+  const T b = g.source_radius;
+  const T distance = sqrt(g.distance_squared);
+  const T nearest = distance - g.target_radius;
+  const auto apart = g.distance_squared > square(g.target_radius + T(1.0 / kLargestOpening) * b);
+  const auto whole = T(kOctupole) * g.source_mass * (b * b * b) < g.largest_error * square(square(nearest)) * nearest;
+  const T otherwise = select(apart & whole, T(1), T(0));
+  return select(apart & detail::expandable(g, distance), T(2), otherwise);
+}
+
+BRECCIA_HD OpeningGeometry<double> opening_geometry(const Cell& source, const Cell& target, double largest_error) {
   const Vec3d d = target.centre - source.centre;
-  const double d2 = dot(d, d);
-  if (d2 <= detail::square(target.radius + source.radius / kLargestOpening)) return Opening::kOpen;
-  const double distance = std::sqrt(d2);
-  const double size = source.radius + target.radius;
-  if (size < kLargestOpening * distance && detail::expandable(source, size, distance, largest_error)) {
-    return Opening::kExpand;
-  }
-  const double nearest = distance - target.radius;
-  const double b = source.radius;
-  const bool whole =
-      kOctupole * source.moments.mass * (b * b * b) < largest_error * detail::square(detail::square(nearest)) * nearest;
-  return whole ? Opening::kWhole : Opening::kOpen;
+  return {dot(d, d), source.radius, source.moments.mass, target.radius, largest_error};
+}
+
+BRECCIA_HD bool expandable(const Cell& source, const Cell& target, double largest_error) {
+  return expandable(opening_geometry(source, target, largest_error));
+}
+
+BRECCIA_HD Opening opening(const Cell& source, const Cell& target, double largest_error) {
+  return static_cast<Opening>(static_cast<int>(opening_number(opening_geometry(source, target, largest_error))));
 }
 
 }  // namespace breccia::gravity

@@ -31,12 +31,37 @@ struct Candidates {
 template <class Real>
 struct Walking {
   Workspace<Real> work;
-  std::vector<std::int32_t> expansions;
-  std::vector<std::int32_t> candidates;
-  std::vector<std::int32_t> stack;
+  std::vector<std::int32_t> candidates, expansions;
+  std::vector<std::int32_t> level, opened, leaves;
+  std::vector<Opening> how;
   double spread = 0.0;  ///< expansions above this group, in pairs per particle
   double reach = 0.0;   ///< farthest particle among the sources of this group, from its centre
   InteractionCounts counts;
+
+  void start(Candidates from) {
+    const auto first = candidates.begin();
+    level.assign(first + static_cast<std::ptrdiff_t>(from.begin), first + static_cast<std::ptrdiff_t>(from.end));
+  }
+};
+
+// Appends up to n cells to a list without asking for room. Which list a cell goes to nobody could predict: chosen from
+// an array, it costs no branch.
+class Appender {
+ public:
+  Appender(std::vector<std::int32_t>& list, std::size_t n) : list_(list) {
+    const std::size_t size = list.size();
+    list.resize(size + n);
+    end_ = list.data() + size;
+  }
+  Appender(const Appender&) = delete;
+  Appender& operator=(const Appender&) = delete;
+  ~Appender() { list_.resize(static_cast<std::size_t>(end_ - list_.data())); }
+
+  void add(std::int32_t cell) { *end_++ = cell; }
+
+ private:
+  std::vector<std::int32_t>& list_;
+  std::int32_t* end_;
 };
 
 // A target cell with all it needs to be walked on its own.
@@ -46,6 +71,10 @@ struct Branch {
   LocalExpansion<double> far;
   double spread;
 };
+
+bool lies_in(const Cell& inner, const Cell& outer) {
+  return inner.begin >= outer.begin && inner.end <= outer.end && inner.end > inner.begin;
+}
 
 template <class Real>
 class Walker {
@@ -92,7 +121,7 @@ class Walker {
            w.spread});
       return;
     }
-    if (cell.is_group()) return sum_group(w, t, from, far);
+    if (cell.is_group() && !is_sparse(w, cell, from)) return sum_group(w, t, from, far);
     LocalExpansion<double> own = far;
     const double spread = w.spread;
     const Candidates rest = separate(w, t, from, own);
@@ -104,32 +133,49 @@ class Walker {
     w.spread = spread;
   }
 
-  void push_children(std::vector<std::int32_t>& stack, const Cell& source) const {
-    for (std::int32_t c = source.first_child + source.children; c-- > source.first_child;) {
-      __builtin_prefetch(&sources_.cell(c));
-      stack.push_back(c);
+  // Whether the group is to be divided: something larger near it is denser by far.
+  [[nodiscard]] bool is_sparse(const Walking<Real>& w, const Cell& group, Candidates from) const {
+    constexpr double kDenser = 64.0;
+    if (group.is_smallest_group()) return false;
+    const auto cube = [](double x) { return x * x * x; };
+    const double density = kDenser * group.moments.mass / cube(group.radius);
+    for (std::size_t k = from.begin; k < from.end; ++k) {
+      const Cell& source = sources_.cell(w.candidates[k]);
+      if (source.count > group.count && source.moments.mass > density * cube(source.radius)) return true;
     }
+    return false;
+  }
+
+  // How each of the cells in w.level is to be taken.
+  void decide(Walking<Real>& w, const Cell& target, double allowed) const {
+    w.how.resize(w.level.size());
+    kernels_.decide({refs(w.level, sources_), &target, allowed, w.how.data()});
+  }
+
+  // The children of w.opened are the next level.
+  void open(Walking<Real>& w) const {
+    w.level.clear();
+    for (const std::int32_t s : w.opened) {
+      const Cell& parent = sources_.cell(s);
+      for (std::int32_t c = parent.first_child; c < parent.first_child + parent.children; ++c) w.level.push_back(c);
+    }
+    w.opened.clear();
   }
 
   // Expands the candidates that are far enough, or their parts, around cell t; returns the others.
   Candidates separate(Walking<Real>& w, std::int32_t t, Candidates from, LocalExpansion<double>& far) const {
     const Cell& target = targets_.cell(t);
-    const double allowed = largest_error(t);
     const std::size_t begin = w.candidates.size();
     w.expansions.clear();
-    for (std::size_t k = from.begin; k < from.end; ++k) {
-      w.stack.assign(1, w.candidates[k]);
-      while (!w.stack.empty()) {
-        const std::int32_t s = w.stack.back();
-        w.stack.pop_back();
-        const Cell& source = sources_.cell(s);
-        if (expandable(source, target, allowed)) {
-          w.expansions.push_back(s);
-        } else if (!source.is_leaf() && source.radius >= target.radius) {
-          push_children(w.stack, source);
-        } else {
-          w.candidates.push_back(s);
-        }
+    for (w.start(from); !w.level.empty(); open(w)) {
+      decide(w, target, largest_error(t));
+      const std::size_t n = w.level.size();
+      Appender lists[3] = {{w.opened, n}, {w.candidates, n}, {w.expansions, n}};
+      for (std::size_t k = 0; k < n; ++k) {
+        const Cell& source = sources_.cell(w.level[k]);
+        const bool expand = w.how[k] == Opening::kExpand;
+        const bool keep = source.is_leaf() | (source.radius < target.radius);
+        lists[expand ? 2 : int{keep}].add(w.level[k]);
       }
     }
     expand_listed(w, target, far);
@@ -174,28 +220,28 @@ class Walker {
 
   void list_sources(Walking<Real>& w, std::int32_t t, Candidates from, bool same) const {
     const Cell& group = targets_.cell(t);
-    const double allowed = largest_error(t);
-    for (std::size_t k = from.begin; k < from.end; ++k) {
-      w.stack.assign(1, w.candidates[k]);
-      while (!w.stack.empty()) {
-        const std::int32_t s = w.stack.back();
-        w.stack.pop_back();
-        const Cell& source = sources_.cell(s);
-        if (same && source.begin >= group.begin && source.end <= group.end && source.end > source.begin) continue;
-        const Opening how = source.count > kFewParticles ? opening(source, group, allowed) : Opening::kOpen;
-        if (how == Opening::kExpand) {
-          w.expansions.push_back(s);
-        } else if (how == Opening::kWhole || source.is_stub()) {
-          w.work.cells.push_back(s);
-          if (how == Opening::kOpen) w.counts.missing += 1.0;
-        } else if (source.is_leaf()) {
-          w.work.add_range(source.begin, source.end);
-          const Vec3d d = source.centre - group.centre;
-          w.reach = std::max(w.reach, std::sqrt(dot(d, d)) + source.radius);
-        } else {
-          push_children(w.stack, source);
-        }
+    w.leaves.clear();
+    for (w.start(from); !w.level.empty(); open(w)) {
+      if (same) {
+        std::erase_if(w.level, [&](std::int32_t s) { return lies_in(sources_.cell(s), group); });
       }
+      decide(w, group, largest_error(t));
+      const std::size_t n = w.level.size();
+      Appender lists[4] = {{w.opened, n}, {w.work.cells, n}, {w.expansions, n}, {w.leaves, n}};
+      for (std::size_t k = 0; k < n; ++k) {
+        const Cell& source = sources_.cell(w.level[k]);
+        const Opening how = source.count > kFewParticles ? w.how[k] : Opening::kOpen;
+        const bool missing = source.is_stub() & (how == Opening::kOpen);
+        const bool leaf = source.is_leaf() & (how == Opening::kOpen);
+        w.counts.missing += missing ? 1.0 : 0.0;
+        lists[missing ? 1 : leaf ? 3 : static_cast<int>(how)].add(w.level[k]);
+      }
+    }
+    for (const std::int32_t s : w.leaves) {
+      const Cell& source = sources_.cell(s);
+      w.work.add_range(source.begin, source.end);
+      const Vec3d d = source.centre - group.centre;
+      w.reach = std::max(w.reach, std::sqrt(dot(d, d)) + source.radius);
     }
   }
 

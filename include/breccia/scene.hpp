@@ -88,7 +88,22 @@ struct NumericsParameters {
   int sort_interval = 32;         ///< most steps between two sortings
   double energy_gain = 0.5;       ///< largest gain of energy over max(kinetic + |potential|)
   bool lone_without_grid = true;  ///< closed form for particles that share no node with another one
+  bool overlap = true;            ///< messages between ranks travel while tiles inside a slab are computed
+  bool reproducible = false;      ///< the same bits on any number of ranks
   LiteralSwitches literal;
+};
+
+enum class BalanceMode {
+  kOff,     ///< slabs stay as they were cut at the start
+  kAlways,  ///< cut anew at every gravity window
+  kAuto     ///< cut anew where the work has become uneven
+};
+
+/// How the work is shared by ranks.
+struct ParallelParameters {
+  BalanceMode balance = BalanceMode::kAuto;
+  double imbalance = 1.05;  ///< largest over mean work of the ranks that kAuto lets be
+  std::optional<int> axis;  ///< 0, 1, 2: slabs across x, y, z; none: across the longest extent of the matter
 };
 
 struct TimeParameters {
@@ -121,6 +136,7 @@ struct Scene {
   EffectSwitches effects;
   GravityParameters gravity;
   NumericsParameters numerics;
+  ParallelParameters parallel;
   TimeParameters time;
   OutputParameters output;
 };

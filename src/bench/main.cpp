@@ -4,6 +4,8 @@
 
 #include "bench/engine_bench.hpp"
 #include "bench/gravity_bench.hpp"
+#include "bench/message_bench.hpp"
+#include "bench/work_bench.hpp"
 #include "breccia/error.hpp"
 #include "mpi/comm.hpp"
 
@@ -20,6 +22,7 @@ int measure(int argc, char** argv) {
   engine->add_option("--precision", options.precision, "mixed or double")->check(CLI::IsMember({"mixed", "double"}));
   engine->add_option("--cores", options.cores, "numbers of threads")->check(CLI::PositiveNumber);
   engine->add_option("--seconds", options.seconds, "least time of a measurement")->capture_default_str();
+  engine->add_flag("--reproducible", options.reproducible, "each state also with numerics.reproducible: its price");
   engine->add_option("--json", options.json, "file for the results, - for standard output");
   breccia::bench::GravityBenchOptions gravity_options;
   CLI::App* gravity = app.add_subcommand("gravity", "time and error of self-gravity");
@@ -30,6 +33,13 @@ int measure(int argc, char** argv) {
   gravity->add_option("--threads", gravity_options.threads, "threads");
   gravity->add_option("--pairs", gravity_options.pairs, "evaluations per setting; the best counts");
   gravity->add_option("--json", gravity_options.json, "file for the results, - for standard output");
+  breccia::bench::WorkBenchOptions work_options;
+  CLI::App* work = app.add_subcommand("work", "time against the counted work by which slabs are balanced");
+  work->add_option("--seconds", work_options.seconds, "least time of a measurement")->capture_default_str();
+  work->add_option("--json", work_options.json, "file for the results, - for standard output");
+  breccia::bench::MessageBenchOptions message_options;
+  CLI::App* messages = app.add_subcommand("messages", "latency and bandwidth between two ranks");
+  messages->add_option("--json", message_options.json, "file for the results, - for standard output");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {
@@ -37,6 +47,8 @@ int measure(int argc, char** argv) {
   }
   if (engine->parsed()) breccia::bench::run_engine_bench(options);
   if (gravity->parsed()) breccia::bench::run_gravity_bench(gravity_options);
+  if (messages->parsed()) breccia::bench::run_message_bench(message_options);
+  if (work->parsed()) breccia::bench::run_work_bench(work_options);
   return 0;
 }
 

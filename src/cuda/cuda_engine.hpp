@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "cuda/cuda_gravity.hpp"
 #include "cuda/device_array.hpp"
 #include "cuda/device_grid.hpp"
 #include "cuda/device_particles.hpp"
@@ -18,7 +19,7 @@
 namespace breccia::cuda {
 
 template <class P>
-class CudaEngine final : public grid::Engine {
+class CudaEngine final : public grid::Engine, public gravity::ResidentParticles {
  public:
   using Real = typename P::Real;
 
@@ -31,12 +32,17 @@ class CudaEngine final : public grid::Engine {
   [[nodiscard]] material::FlawLists flaws() const override;
   void restore(const EngineState& state, const material::FlawLists& flaws) override;
   void sort() override;
+  [[nodiscard]] const mpi::Slabs& slabs() const override { return slabs_; }
+  [[nodiscard]] mpi::PlaneWork work(std::span<const double> more) const override;
+  void cut(const mpi::Slabs& slabs) override;
   void scatter(double half_step) override;
   void update_grid(double kick) override;
   void gather(double step) override;
   void gather_scatter(double step) override;
   void predict(double time, std::vector<Vec3d>& position, std::vector<double>& mass) const override;
   void hold_gravity(std::span<const Vec3d> acceleration) override;
+  [[nodiscard]] std::unique_ptr<gravity::ResidentSolver> make_resident_solver(
+      GravityMethod method, const gravity::Parameters& parameters) override;
   void kick_velocities(double time) override;
   [[nodiscard]] ParticleOutput observe() const override;
   [[nodiscard]] ParticleOutput inspect() const override;
@@ -55,6 +61,7 @@ class CudaEngine final : public grid::Engine {
 
   [[nodiscard]] PassArguments<Real> pass_arguments(double step, double half_step) const;
   [[nodiscard]] NodeArguments<Real> node_arguments(double kick) const;
+  [[nodiscard]] PredictArguments<Real> predict_arguments(double time) const;
   void launch_pass(const PassArguments<Real>& arguments);
   void settle();
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
@@ -67,7 +74,6 @@ class CudaEngine final : public grid::Engine {
             const std::vector<std::vector<std::byte>>& messages);
   [[nodiscard]] std::vector<std::vector<std::byte>> messages_of(const std::vector<std::vector<unsigned>>& leaving,
                                                                 std::span<const grid::BlockKey> keys);
-  void cut_anew();
   void save_flaws(EngineState& state) const;
   void switch_damage_off();
   [[nodiscard]] std::vector<Vec3d> positions() const;

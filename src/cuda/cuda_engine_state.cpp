@@ -85,7 +85,7 @@ material::FlawLists CudaEngine<P>::flaws() const {
 
 template <class P>
 void CudaEngine<P>::restore(const EngineState& state, const material::FlawLists& flaws) {
-  if (!state.same_ranks) {
+  if (!state.same_ranks || setup_.slab_axis.value_or(state.slab_axis) != state.slab_axis) {
     // The host engine knows how to cut slabs and share out particles.
     const auto host = grid::make_host_engine(setup_, comm_);
     host->restore(state, flaws);

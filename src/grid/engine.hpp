@@ -11,9 +11,11 @@
 #include "breccia/engine_state.hpp"
 #include "breccia/particle_arrays.hpp"
 #include "breccia/scene.hpp"
+#include "breccia/timeline.hpp"
 #include "material/effects_policy.hpp"
 #include "material/flaws.hpp"
 #include "mpi/comm.hpp"
+#include "mpi/slabs.hpp"
 
 namespace breccia::grid {
 
@@ -27,6 +29,7 @@ struct EngineSetup {
   Vec3d uniform_gravity{};    ///< [m/s2]
   NumericsParameters numerics;
   int threads = 1;
+  std::optional<int> slab_axis;  ///< the grid is cut along it; none: along the longest extent of the matter
 };
 
 /// What tells how a particle is.
@@ -75,8 +78,12 @@ struct EngineStats {
   std::uint64_t particles = 0;
   std::uint64_t lone_particles = 0;  ///< that use no grid
   std::uint64_t tiles = 0;
+  std::uint64_t packs = 0;  ///< SIMD packs in tiles; 0 on a device
   std::uint64_t blocks = 0;
   std::uint64_t halo_bytes_per_step = 0;
+  std::uint64_t key_exchanges = 0;  ///< sortings after which ranks had to agree on shared blocks anew
+  double halo_in_flight = 0.0;      ///< from sending to having received, all messages of nodes so far [s]
+  double halo_waited = 0.0;         ///< of that, with nothing else to do [s]
   std::uint64_t particle_bytes = 0;
   std::uint64_t grid_bytes = 0;
 };
@@ -102,6 +109,16 @@ class Engine {
   /// Sorts particles into tiles, sends those that left the slab to their owner, rebuilds blocks and halo. Only between
   /// gather() and scatter(). Collective.
   virtual void sort() = 0;
+
+  /// How the grid is cut. insert() cuts for equal numbers of particles, sort() leaves cuts as they are.
+  [[nodiscard]] virtual const mpi::Slabs& slabs() const = 0;
+  /// What the particles of this rank cost in a step on this engine, by the block planes that slabs().axis() crosses [ps].
+  /// Counted, not timed (grid/work_weights.hpp), so that a run repeats. `more`: what each of them costs elsewhere [ps of
+  /// a step], in the order of predict(); empty for nothing. Only between sort() and scatter().
+  [[nodiscard]] virtual mpi::PlaneWork work(std::span<const double> more) const = 0;
+  /// Cuts the grid anew; particles go to their owners with all that they hold, and are sorted. Only between sort() and
+  /// scatter(). Collective.
+  virtual void cut(const mpi::Slabs& slabs) = 0;
 
   /// Stress and P2G: particles at t_n give the sums of the grid. `half_step`: half the dt of the velocity gradient.
   virtual void scatter(double half_step) = 0;
@@ -142,6 +159,8 @@ class Engine {
   /// May wait for a device: not meant for every step.
   [[nodiscard]] virtual PassReport passes() const = 0;
   [[nodiscard]] virtual EngineStats stats() const = 0;
+  /// Has tiles and messages noted in `timeline` from now on; null: no more. An engine may have nothing to note.
+  virtual void record(Timeline* timeline) { static_cast<void>(timeline); }
 };
 
 /// The engine on host cores.

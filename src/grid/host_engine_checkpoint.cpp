@@ -91,13 +91,12 @@ void HostEngine<P>::restore(const EngineState& state, const material::FlawLists&
     if (store_.has(Group::kFlaws)) restore_flaws(state, flaws);
   });
   smallest_mass_ = state.smallest_mass;
-  if (state.same_ranks) {
+  if (state.same_ranks && setup_.slab_axis.value_or(state.slab_axis) == state.slab_axis) {
     slabs_ = mpi::Slabs(state.slab_axis, state.slab_cuts);
-    slabs_chosen_ = true;
   } else {
     choose_slabs(placements);
   }
-  settle_in_slabs(std::move(placements));
+  settle(std::move(placements));
 }
 
 template <class P>

@@ -75,6 +75,7 @@ void HostEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
     throw UsageError("a particle starts more than 4 million cells from the origin: choose a larger grid.cell");
   }
   smallest_mass_ = comm_.min(lightest);
+  choose_slabs(placements);
   settle(std::move(placements));
 }
 

@@ -62,58 +62,11 @@ void HostEngine<P>::sort() {
 
 template <class P>
 void HostEngine<P>::settle(std::vector<Placement> placements) {
-  if (!slabs_chosen_ || unbalanced(placements.size())) choose_slabs(placements);
-  settle_in_slabs(std::move(placements));
-}
-
-template <class P>
-void HostEngine<P>::settle_in_slabs(std::vector<Placement> placements) {
   migrate(placements);
   arrange(separate(std::move(placements)));
   connect_tiles();
-  connect_halo();
-  plan_sweep();
   report_ = {};
   gathers_ = 0;
-}
-
-template <class P>
-bool HostEngine<P>::unbalanced(std::size_t particles) const {
-  // Counts, not clocks: a run repeats bit for bit.
-  constexpr double kAllowed = 1.2;
-  const auto mine = static_cast<std::uint64_t>(particles);
-  const auto mean = static_cast<double>(comm_.sum(mine)) / comm_.size();
-  return comm_.size() > 1 && static_cast<double>(comm_.max(mine)) > kAllowed * mean;
-}
-
-template <class P>
-void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
-  const int axis = slabs_chosen_ ? slabs_.axis() : longest_axis(placements);
-  mpi::PlaneWork work;
-  for (const Placement& p : placements) ++work[floor_div4(p.node[axis])];
-  slabs_ = mpi::Slabs::balanced(axis, work, comm_);
-  slabs_chosen_ = true;
-}
-
-template <class P>
-int HostEngine<P>::longest_axis(std::span<const Placement> placements) const {
-  // Slabs across the longest extent of the matter share the fewest nodes.
-  int longest = 0;
-  std::int64_t extent = -1;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::int32_t low = INT32_MAX;
-    std::int32_t high = INT32_MIN;
-    for (const Placement& p : placements) {
-      low = std::min(low, p.node[axis]);
-      high = std::max(high, p.node[axis]);
-    }
-    const std::int64_t length = std::int64_t{comm_.max(high)} - comm_.min(low);
-    if (length > extent) {
-      extent = length;
-      longest = axis;
-    }
-  }
-  return longest;
 }
 
 template <class P>
@@ -204,6 +157,7 @@ void HostEngine<P>::arrange(const SortedPlacements& all) {
     source[slot] = placements[i].slot;
     node[slot] = tile_node(placements[i].node);
   }
+  if (setup_.numerics.reproducible) sort_cells_by_id(source, place);
   lone_block_.clear();
   lone_node_.clear();
   for (const Placement& p : all.lone) {
@@ -220,6 +174,20 @@ void HostEngine<P>::arrange(const SortedPlacements& all) {
   blocks_.clear();
   for (const std::uint32_t b : by_key) blocks_.insert(keys[b]);
   if (store_.has(Group::kFlaws)) compact_flaws();
+}
+
+template <class P>
+void HostEngine<P>::sort_cells_by_id(std::span<std::uint32_t> source, std::span<const std::uint32_t> cell_ends) const {
+  // Else the order would tell from which rank a particle came.
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    std::size_t first = tiles_[t].first_pack * kLanes;
+    for (std::size_t c = 0; c < kBlockNodes; ++c) {
+      const std::size_t last = cell_ends[t * kBlockNodes + c];
+      const auto cell = source.subspan(first, last - first);
+      if (cell.size() > 1) std::ranges::sort(cell, {}, [&](std::uint32_t slot) { return id(slot); });
+      first = last;
+    }
+  }
 }
 
 template <class P>

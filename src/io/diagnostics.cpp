@@ -50,6 +50,9 @@ const std::array kColumns{
     DiagnosticsColumn{"active_blocks", "1", "grid blocks in use, all ranks", &Row::active_blocks},
     DiagnosticsColumn{"particles_per_rank_min", "1", "particles of the emptiest rank", &Row::particles_per_rank_min},
     DiagnosticsColumn{"particles_per_rank_max", "1", "particles of the fullest rank", &Row::particles_per_rank_max},
+    DiagnosticsColumn{"imbalance", "1", "largest over mean work of the ranks, counted at the start of the gravity window",
+                      &Row::imbalance},
+    DiagnosticsColumn{"recuts", "1", "times that slabs were cut anew, on this number of ranks", &Row::recuts},
     DiagnosticsColumn{"wall_seconds", "s", "wall time since the start of the program", &Row::wall_seconds},
 };
 

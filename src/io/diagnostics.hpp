@@ -38,6 +38,8 @@ struct DiagnosticsRow {
   std::uint64_t active_blocks = 0;
   std::uint64_t particles_per_rank_min = 0;
   std::uint64_t particles_per_rank_max = 0;
+  double imbalance = 1.0;
+  std::uint64_t recuts = 0;
   double wall_seconds = 0.0;
 };
 

@@ -58,7 +58,7 @@ std::span<const Key> key_table();
 std::vector<Key> run_keys();       ///< scene, grid, time
 std::vector<Key> material_keys();  ///< materials.NAME
 std::vector<Key> body_keys();      ///< body[], impact, boundary[]
-std::vector<Key> method_keys();    ///< effects, gravity, numerics, output
+std::vector<Key> method_keys();    ///< effects, gravity, numerics, parallel, output
 
 inline constexpr Range kAny{};
 inline constexpr Range kPositive{0.0, std::numeric_limits<double>::infinity(), true, false};

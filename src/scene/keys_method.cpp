@@ -1,4 +1,4 @@
-// Keys of [effects], [gravity], [numerics] and [output].
+// Keys of [effects], [gravity], [numerics], [parallel] and [output].
 #include "scene/keys.hpp"
 
 namespace breccia::scene {
@@ -153,6 +153,22 @@ std::vector<Key> numerics() {
        "",
        "closed form for particles that share no node with another one; the same result to rounding, much faster",
        [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.lone_without_grid; }},
+      {"numerics.overlap",
+       kPure,
+       kAny,
+       {},
+       "",
+       "",
+       "messages between ranks travel while the inside of each slab is computed; false waits for them, the same result",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.overlap; }},
+      {"numerics.reproducible",
+       kPure,
+       kAny,
+       {},
+       "",
+       "",
+       "the same bits on any number of ranks (with self-gravity: on the same number of ranks)",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.reproducible; }},
       {"numerics.cap_damaged_yield",
        kPure,
        kAny,
@@ -185,6 +201,41 @@ std::vector<Key> numerics() {
        "",
        "volume ratio J of a lone expanding particle stops here",
        [](Draft& d, std::size_t) -> Slot { return &d.scene.numerics.literal.volume_ratio_max; }},
+  };
+}
+
+std::vector<Key> parallel() {
+  return {
+      {"parallel.balance",
+       kPure,
+       kAny,
+       {"off", "always", "auto"},
+       "",
+       "",
+       "when slabs are cut anew, at the start of a gravity window: never, at each, or (auto) where the counted work of "
+       "the ranks has become uneven and other cuts help",
+       [](Draft& d, std::size_t) { return choice(d.scene.parallel.balance); }},
+      {"parallel.imbalance",
+       kPure,
+       {1.0, 1.0e6},
+       {},
+       "",
+       "",
+       "largest over mean work of the ranks that auto lets be",
+       [](Draft& d, std::size_t) -> Slot { return &d.scene.parallel.imbalance; }},
+      {"parallel.axis",
+       kPure,
+       kAny,
+       {"x", "y", "z", "auto"},
+       "",
+       "",
+       "axis that slabs cut across; auto: the longest of the matter where particles are first shared out. A restart may "
+       "change it",
+       [](Draft& d, std::size_t) -> Slot {
+         std::optional<int>& axis = d.scene.parallel.axis;
+         return ChoiceSlot{[&axis] { return std::optional(static_cast<std::size_t>(axis.value_or(3))); },
+                           [&axis](std::size_t i) { axis = i < 3 ? std::optional(static_cast<int>(i)) : std::nullopt; }};
+       }},
   };
 }
 
@@ -271,7 +322,7 @@ std::vector<Key> output() {
 
 std::vector<Key> method_keys() {
   std::vector<Key> keys = effects();
-  for (auto part : {gravity(), numerics(), output()})
+  for (auto part : {gravity(), numerics(), parallel(), output()})
     for (Key& key : part) keys.push_back(std::move(key));
   return keys;
 }

@@ -56,6 +56,24 @@ io::DiagnosticsRow row_from(const Json& json) {
   return row;
 }
 
+Json balance_json(const BalanceState& balance) {
+  return {{"windows", balance.windows},
+          {"recuts", balance.recuts},
+          {"imbalance", balance.imbalance},
+          {"imbalance_sum", balance.imbalance_sum},
+          {"imbalance_max", balance.imbalance_max}};
+}
+
+BalanceState balance_from(const Json& json) {
+  BalanceState balance;
+  json.at("windows").get_to(balance.windows);
+  json.at("recuts").get_to(balance.recuts);
+  json.at("imbalance").get_to(balance.imbalance);
+  json.at("imbalance_sum").get_to(balance.imbalance_sum);
+  json.at("imbalance_max").get_to(balance.imbalance_max);
+  return balance;
+}
+
 Json loop_json(const LoopState& loop) {
   Json lost = Json::array();
   for (const LostWork& work : loop.lost) lost.push_back({work.plastic, work.viscous, work.clamped});
@@ -64,7 +82,8 @@ Json loop_json(const LoopState& loop) {
           {"previous_dt", loop.previous_dt},
           {"step", loop.step},
           {"sort_interval", loop.sort_interval},
-          {"lost_work", lost}};
+          {"lost_work", lost},
+          {"balance", balance_json(loop.balance)}};
 }
 
 LoopState loop_from(const Json& json) {
@@ -77,6 +96,7 @@ LoopState loop_from(const Json& json) {
   for (const Json& work : json.at("lost_work")) {
     loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>(), whole<std::uint64_t>(work.at(2))});
   }
+  loop.balance = balance_from(json.at("balance"));
   const bool steps = loop.dt > 0.0 && loop.previous_dt > 0.0 && std::isfinite(loop.dt + loop.previous_dt);
   if (!steps || !(loop.time >= 0.0) || !std::isfinite(loop.time) || loop.sort_interval < 1) {
     throw IoError("the state of the run has times that are none");
@@ -135,8 +155,8 @@ OutputState output_from(const Json& json) {
 }
 
 // Keys that neither the particles nor their fields depend on. Those that end in '.' stand for all below.
-constexpr std::array<std::string_view, 11> kHarmless{
-    "output.",          "numerics.energy_gain", "scene.name",   "scene.end",     "time.cfl",     "effects.gravity",
+constexpr std::array<std::string_view, 12> kHarmless{
+    "output.", "parallel.",          "numerics.energy_gain", "scene.name",   "scene.end",     "time.cfl",     "effects.gravity",
     "gravity.interval", "gravity.opening",      "gravity.mesh", "gravity.split", "gravity.error"};
 
 bool harmless(const std::string& key) {

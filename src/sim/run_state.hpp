@@ -20,6 +20,16 @@ struct LostWork {
   std::uint64_t clamped = 0;  ///< volume changes that were cut (PassReport::clamped)
 };
 
+/// Of the balance of loads, since the start or since the number of ranks changed. Imbalance is the largest over the mean
+/// counted work of the ranks.
+struct BalanceState {
+  std::uint64_t windows = 0;    ///< at whose start work was counted
+  std::uint64_t recuts = 0;     ///< times that slabs were cut anew
+  double imbalance = 1.0;       ///< in the last window
+  double imbalance_sum = 0.0;   ///< of all windows
+  double imbalance_max = 1.0;
+};
+
 /// Of the time loop at a window start: the window's phase and the steps since the last sorting are 0 there.
 struct LoopState {
   double time = 0.0;
@@ -28,6 +38,7 @@ struct LoopState {
   std::uint64_t step = 0;
   int sort_interval = 1;
   std::vector<LostWork> lost;  ///< of each rank
+  BalanceState balance;
 };
 
 /// Of the conservation budget.

@@ -101,6 +101,7 @@ std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const Resolv
   setup.uniform_gravity = scene.gravity.uniform;
   setup.numerics = scene.numerics;
   setup.threads = threads;
+  setup.slab_axis = scene.parallel.axis;
   return make(setup, comm);
 }
 

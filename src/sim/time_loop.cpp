@@ -12,6 +12,16 @@ double step_at_rest(const Scene& scene, const ResolvedEffects& effects) {
   return stable_step(scene, initial_speeds(scene, effects.material.shear), effects.material.viscosity).seconds;
 }
 
+LostWork sum_of(const std::vector<LostWork>& ranks) {
+  LostWork sum;
+  for (const LostWork& work : ranks) {
+    sum.plastic += work.plastic;
+    sum.viscous += work.viscous;
+    sum.clamped += work.clamped;
+  }
+  return sum;
+}
+
 }  // namespace
 
 TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threads, const mpi::Comm& comm,
@@ -22,12 +32,14 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
       comm_(comm),
       engine_(make_loaded_engine(scene, effects, threads, comm, make)),
       window_(scene.gravity.interval),
-      guard_(scene, step_at_rest(scene, effects), comm) {
+      guard_(scene, step_at_rest(scene, effects), comm),
+      balance_(scene, comm) {
   const grid::SignalSpeeds speeds = engine_->signal_speeds();
   dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
   set_sort_interval(speeds.particle * dt_ / scene_.cell);
   make_solver(effects, threads);
   if (solver_) evaluate_gravity();
+  balance_ranks();
   engine_->kick_velocities(0.5 * dt_);
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * dt_); });
 }
@@ -41,6 +53,7 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const Eng
       engine_(make_restored_engine(scene, effects, engine, threads, comm, make)),
       window_(scene.gravity.interval),
       guard_(scene, step_at_rest(scene, effects), comm),
+      balance_(scene, comm),
       time_(state.time),
       dt_(state.dt),
       previous_dt_(state.previous_dt),
@@ -50,12 +63,11 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, const Eng
   const auto rank = static_cast<std::size_t>(comm.rank());
   if (state.lost.size() == static_cast<std::size_t>(comm.size())) {
     lost_ = state.lost[rank];
-  } else if (comm.is_root()) {
-    for (const LostWork& work : state.lost) {
-      lost_.plastic += work.plastic;
-      lost_.viscous += work.viscous;
-      lost_.clamped += work.clamped;
-    }
+    balance_.restore(state.balance);
+  } else {
+    if (comm.is_root()) lost_ = sum_of(state.lost);
+    // Gravity was evaluated elsewhere: what it cost is counted from the next window on.
+    timers_("balance", [&] { balance_.at_window_start(*engine_, nullptr); });
   }
   timers_("stress, p2g", [&] { engine_->scatter(0.5 * previous_dt_); });
 }
@@ -69,12 +81,23 @@ void TimeLoop::make_solver(const ResolvedEffects& effects, int threads) {
       .error = scene_.gravity.error,
       .opening = scene_.gravity.opening};
   solver_ = gravity::make_solver(effects.gravity_method, parameters, comm_, threads);
+  auto* particles = dynamic_cast<gravity::ResidentParticles*>(engine_.get());
+  if (particles != nullptr) resident_ = particles->make_resident_solver(effects.gravity_method, parameters);
 }
 
-LoopState TimeLoop::state() const { return {time_, dt_, previous_dt_, step_, sort_interval_, comm_.allgather(lost_)}; }
+void TimeLoop::record(Timeline& timeline) {
+  timeline_ = &timeline;
+  engine_->record(&timeline);
+  timers_.record(&timeline);
+}
+
+LoopState TimeLoop::state() const {
+  return {time_, dt_, previous_dt_, step_, sort_interval_, comm_.allgather(lost_), balance_.state()};
+}
 
 void TimeLoop::run(const Visit& at_time_step, const Visit& at_window_start) {
   for (;;) {
+    if (timeline_ != nullptr) timeline_->begin_step();
     // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
     timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
     if (!at_time_step(*this)) return check();
@@ -127,6 +150,11 @@ void TimeLoop::begin_window() {
     guard_.check_step(dt_, *engine_);
   }
   if (solver_) evaluate_gravity();
+  balance_ranks();
+}
+
+void TimeLoop::balance_ranks() {
+  timers_("balance", [&] { balance_.at_window_start(*engine_, solver_.get()); });
 }
 
 // Inside a window dt stays, for which gravity was predicted, unless a shock has used up a quarter of the margin that
@@ -145,19 +173,22 @@ double TimeLoop::stable_step_now() {
 }
 
 void TimeLoop::evaluate_gravity() {
+  const double time = window_.prediction_time(dt_);
   timers_("gravity", [&] {
+    if (resident_) return resident_->evaluate_and_hold(time);
     std::vector<Vec3d> position;
     std::vector<double> mass;
-    engine_->predict(window_.prediction_time(dt_), position, mass);
+    engine_->predict(time, position, mass);
     std::vector<Vec3d> acceleration(position.size());
     solver_->evaluate({position, mass}, acceleration, {});
     engine_->hold_gravity(acceleration);
   });
-  const gravity::Phases& phases = solver_->last().phases;
+  const gravity::Stats& stats = resident_ ? resident_->last() : solver_->last();
+  const gravity::Phases& phases = stats.phases;
   for (std::size_t k = 0; k < phases.seconds.size(); ++k) {
     if (phases.seconds[k] > 0.0) timers_.add_part("gravity", gravity::kPhaseNames[k], phases.seconds[k]);
   }
-  gravity_record_.add(solver_->last());
+  gravity_record_.add(stats);
 }
 
 void TimeLoop::check() {

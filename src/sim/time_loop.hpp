@@ -5,9 +5,11 @@
 #include <functional>
 #include <memory>
 
+#include "gravity/resident.hpp"
 #include "gravity/solver.hpp"
 #include "gravity/window.hpp"
 #include "grid/engine.hpp"
+#include "sim/balance.hpp"
 #include "sim/diagnostics.hpp"
 #include "sim/effects.hpp"
 #include "sim/gravity_record.hpp"
@@ -48,7 +50,10 @@ class TimeLoop {
   [[nodiscard]] LostWork lost_work() const;
   [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
   [[nodiscard]] const Guard& guard() const { return guard_; }
+  [[nodiscard]] const BalanceState& balance() const { return balance_.state(); }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
+  /// Notes in `timeline` what is done when.
+  void record(Timeline& timeline);
 
  private:
   bool one_step(const Visit& at_window_start);
@@ -60,6 +65,7 @@ class TimeLoop {
   void shorten_step();
   [[nodiscard]] double stable_step_now();
   void evaluate_gravity();
+  void balance_ranks();
   [[nodiscard]] bool sorting_due() const { return steps_since_sort_ + 1 >= sort_interval_; }
   void set_sort_interval(double cells_per_step);
 
@@ -68,10 +74,12 @@ class TimeLoop {
   bool adaptive_;
   mpi::Comm comm_;
   std::unique_ptr<grid::Engine> engine_;
-  std::unique_ptr<gravity::Solver> solver_;  // null: no self-gravity
+  std::unique_ptr<gravity::Solver> solver_;            // null: no self-gravity
+  std::unique_ptr<gravity::ResidentSolver> resident_;  // in its place where the engine can evaluate gravity itself
   gravity::Window window_;
   GravityRecord gravity_record_;
   Guard guard_;
+  Balance balance_;
   LostWork lost_;  // up to the last sorting
   double time_ = 0.0;
   double dt_ = 0.0;           // of the step that comes
@@ -80,6 +88,7 @@ class TimeLoop {
   int sort_interval_ = 1;
   int steps_since_sort_ = 0;
   mutable StageTimers timers_;
+  Timeline* timeline_ = nullptr;
 };
 
 }  // namespace breccia::sim

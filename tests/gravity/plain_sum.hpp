@@ -76,4 +76,22 @@ inline void add_rock(Cloud& cloud, std::size_t about, Vec3d centre, double radiu
   }
 }
 
+/// The same on a face-centred cubic lattice, as bodies of a scene are by default.
+inline void add_fcc_rock(Cloud& cloud, std::size_t about, Vec3d centre, double radius, std::mt19937_64& random) {
+  const double h = radius * std::cbrt(16.0 / 3.0 * kPi / static_cast<double>(about));
+  std::uniform_real_distribution<double> jitter(-0.05, 0.05);
+  const int reach = 2 * (static_cast<int>(radius / h) + 1);
+  for (int i = -reach; i <= reach; ++i) {
+    for (int j = -reach; j <= reach; ++j) {
+      for (int k = -reach; k <= reach; ++k) {
+        if ((i + j + k) % 2 != 0) continue;
+        const Vec3d p{h * (0.5 * i + jitter(random)), h * (0.5 * j + jitter(random)), h * (0.5 * k + jitter(random))};
+        if (dot(p, p) > radius * radius) continue;
+        cloud.position.push_back(centre + p);
+        cloud.mass.push_back(3e13);
+      }
+    }
+  }
+}
+
 }  // namespace breccia::gravity

@@ -60,6 +60,7 @@ struct Outcome {
   std::vector<Sample> end;
   LoopState at_checkpoint;
   LostWork lost;
+  BalanceState balance;
   double damage_at_checkpoint = 0.0;
 };
 
@@ -72,6 +73,7 @@ TimeLoop::Visit until_end(Outcome& run, const mpi::Comm& comm) {
     if (loop.step() < kEnd) return true;
     run.end = samples(loop.engine().observe(), comm);
     run.lost = loop.lost_work();
+    run.balance = loop.balance();
     return false;
   };
 }
@@ -107,6 +109,20 @@ void expect_same_bits(const Outcome& one, const Outcome& other) {
   EXPECT_EQ(one.lost.viscous, other.lost.viscous);
 }
 
+// Sums of a node run in another order: rounding, which contact amplifies a little (ranks_test.cpp has the same bound); a
+// particle that is lost or has a neighbour's flaws shows as 1e-6 and more.
+void expect_near(const Outcome& one, const Outcome& other) {
+  constexpr double kTolerance = 1e-12;
+  ASSERT_EQ(one.end.size(), other.end.size());
+  for (std::size_t i = 0; i < one.end.size(); ++i) {
+    const Vec3d moved = one.end[i].position - other.end[i].position;
+    const Vec3d faster = one.end[i].velocity - other.end[i].velocity;
+    ASSERT_LE(std::sqrt(dot(moved, moved)), kTolerance * 200e3) << "particle " << i;
+    ASSERT_LE(std::sqrt(dot(faster, faster)), kTolerance * 200.0) << "particle " << i;
+    ASSERT_NEAR(one.end[i].damage, other.end[i].damage, kTolerance) << "particle " << i;
+  }
+}
+
 void expect_bitwise(std::vector<std::string> overrides, bool breaking = false) {
   overrides.emplace_back("gravity.interval=8");
   const mpi::Comm comm;
@@ -135,6 +151,20 @@ TEST(Checkpoint, FluidWithoutEnergy) {
 // Bodies so thin that most particles share no node with others and go without grid.
 TEST(Checkpoint, LoneParticles) {
   expect_bitwise({"grid.cell=1500 m", "body[0].particles=300", "body[1].particles=300"});
+}
+
+// Slabs that are cut anew before and after the checkpoint, and the record of that.
+TEST(Checkpoint, SlabsCutAnew) {
+  const std::vector<std::string> overrides{"gravity.interval=8", "parallel.balance=always", "numerics.precision=mixed"};
+  const mpi::Comm comm;
+  const SharedFile file(comm);
+  const Scene scene = load(collision(9e3), overrides);
+  const Outcome whole = run_through(scene, file.path(), comm);
+  const Outcome parts = run_on(scene, file.path(), whole.at_checkpoint, comm);
+  expect_same_bits(whole, parts);
+  EXPECT_EQ(whole.balance.recuts, comm.size() > 1 ? kEnd / 8 + 1 : 0);
+  EXPECT_EQ(parts.balance.recuts, whole.balance.recuts);
+  EXPECT_EQ(parts.balance.imbalance_sum, whole.balance.imbalance_sum);
 }
 
 // Neither the interrupted run nor the continued one depends on the threads.
@@ -234,24 +264,30 @@ TEST(Checkpoint, DamageFinished) {
   expect_same_bits(whole, run_on(scene, file.path(), whole.at_checkpoint, comm));
 }
 
-// Sums of a node run in another order then: rounding, which contact amplifies a little (ranks_test.cpp has the same
-// bound); a particle that is lost or has a neighbour's flaws shows as 1e-6 and more.
+// Cut across another axis where it goes on: the same to rounding, as on another number of ranks.
+TEST(Checkpoint, OtherAxisOfSlabs) {
+  const mpi::Comm comm;
+  const SharedFile file(comm);
+  const Scene scene = load(collision(9e3), {"gravity.interval=8"});
+  const Outcome whole = run_through(scene, file.path(), comm);
+  const Scene across = load(collision(9e3), {"gravity.interval=8", "parallel.axis=z"});
+  EXPECT_EQ(TimeLoop(across, resolve_effects(across), io::read_checkpoint(file.path(), comm).engine, whole.at_checkpoint,
+                     1, comm)
+                .engine()
+                .slabs()
+                .axis(),
+            2);
+  expect_near(whole, run_on(across, file.path(), whole.at_checkpoint, comm));
+}
+
 TEST(Checkpoint, OtherNumberOfRanks) {
-  constexpr double kTolerance = 1e-12;
   const mpi::Comm comm;
   const mpi::Comm self(MPI_COMM_SELF);
   const SharedFile file(comm);
   const Scene scene = load(collision(9e3), {"gravity.interval=8"});
   const Outcome whole = run_through(scene, file.path(), comm);
   const Outcome alone = run_on(scene, file.path(), whole.at_checkpoint, self);
-  ASSERT_EQ(whole.end.size(), alone.end.size());
-  for (std::size_t i = 0; i < whole.end.size(); ++i) {
-    const Vec3d moved = whole.end[i].position - alone.end[i].position;
-    const Vec3d faster = whole.end[i].velocity - alone.end[i].velocity;
-    ASSERT_LE(std::sqrt(dot(moved, moved)), kTolerance * 200e3) << "particle " << i;
-    ASSERT_LE(std::sqrt(dot(faster, faster)), kTolerance * 200.0) << "particle " << i;
-    ASSERT_NEAR(whole.end[i].damage, alone.end[i].damage, kTolerance) << "particle " << i;
-  }
+  expect_near(whole, alone);
 }
 
 }  // namespace

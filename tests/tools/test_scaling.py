@@ -1,0 +1,141 @@
+"""The performance model against what it must give by hand, and tools/scaling on one and two ranks."""
+
+import dataclasses
+import json
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path.insert(0, str(ROOT / "tools"))
+
+from scaling_parts import batch, model, report, series  # noqa: E402
+
+PLAIN = model.Machine(name="plain", particle=50e-9, tile=0.0, fixed=0.0, latency=0.0, bandwidth=1e30,
+                      gravity_particle=0.0, gravity_node=0.0)
+
+
+class Model(unittest.TestCase):
+    def test_planes_hold_all_matter(self):
+        for particles in (1e4, 1e6, 1e9):
+            case = model.Case(particles)
+            self.assertAlmostEqual(sum(model.plane_cells(case)) * case.per_cell / particles, 1.0, places=9)
+
+    def test_cuts_are_the_best(self):
+        work = [3, 1, 4, 1, 5, 9, 2, 6]
+        ends = [0, *model.cuts(work, 3), len(work)]
+        most = max(sum(work[a:b]) for a, b in zip(ends, ends[1:]))
+        best = min(max(sum(work[:a]), sum(work[a:b]), sum(work[b:])) for a in range(9) for b in range(a, 9))
+        self.assertEqual(most, best)
+
+    def test_without_messages_the_imbalance_is_all_that_is_lost(self):
+        case = model.Case(1e8, interval=0)
+        for ranks in (2, 8, 64):
+            step = model.step(case, PLAIN, ranks)
+            self.assertAlmostEqual(model.speed_up(case, PLAIN, ranks) * step.imbalance / ranks, 1.0, places=9)
+            self.assertLess(step.imbalance, 1.0 + 2.5 * ranks / len(model.plane_cells(case)))
+
+    def test_no_more_ranks_work_than_planes_are(self):
+        case = model.Case(1e6, interval=0)
+        planes = len(model.plane_cells(case))
+        many = model.step(case, PLAIN, 1024)
+        self.assertLessEqual(many.busy_ranks, planes)
+        self.assertLess(many.busy_ranks, 64)
+
+    def test_halo_grows_with_the_area(self):
+        for ranks in (3, 4):  # two are cut where the spheres touch
+            bytes_of = [model.step(model.Case(n, interval=0), PLAIN, ranks).halo_bytes for n in (1e8, 8e8)]
+            # The margin of a few cells makes it a little less than four times.
+            self.assertAlmostEqual(bytes_of[1] / bytes_of[0], 4.0, delta=0.25)
+
+    def test_latency_and_bandwidth(self):
+        case = model.Case(1e8, interval=0)
+        slow = dataclasses.replace(PLAIN, latency=1e-3, bandwidth=1e9)
+        step = model.step(case, slow, 4)
+        # Two phases with two neighbours.
+        self.assertAlmostEqual(step.halo, 4e-3 + step.halo_bytes / 1e9, places=12)
+        hidden = model.step(case, dataclasses.replace(slow, hidden=0.9), 4)
+        self.assertAlmostEqual(hidden.halo, 0.1 * step.halo, places=12)
+
+    def test_halo_is_hidden_only_behind_what_there_is_to_do(self):
+        case = model.Case(1e5, interval=0)
+        slow = dataclasses.replace(PLAIN, latency=1.0, hidden=1.0)
+        step = model.step(case, slow, 2)
+        self.assertGreater(step.halo, 2.0 - step.engine - 1e-9)
+
+    def test_fit_gives_back_what_it_is_given(self):
+        truth = model.Machine("truth", 60e-9, 1.5e-6, 0.0, 2e-6, 5e9, 0.7e-6, 20e-9)
+        runs = []
+        for particles in (2e4, 1e5, 1e6):
+            case = model.Case(particles)
+            edge = 2 * case.radius / case.mesh_cell
+            runs.append({"particles": particles, "per_cell": case.per_cell,
+                         "engine": model.step(dataclasses.replace(case, interval=0), truth, 1).engine,
+                         "gravity_near": 0.7e-6 * particles, "gravity_mesh": 20e-9 * 16 * edge**3})
+        found = model.fit(runs, (truth.latency, truth.bandwidth), "truth")
+        for field in dataclasses.fields(truth)[1:]:
+            self.assertAlmostEqual(getattr(found, field.name), getattr(truth, field.name),
+                                   delta=1e-6 * (getattr(truth, field.name) or 1.0), msg=field.name)
+
+    def test_sizes_that_do_not_tell(self):
+        with self.assertRaises(ValueError):
+            model.least_squares([[1.0, 2.0], [2.0, 4.0]], [1.0, 2.0])
+
+    def test_predictions_name_all_ranks(self):
+        lines = report.predictions(model.H100)
+        self.assertEqual([int(line.split()[0]) for line in lines[2:]], [2**k for k in range(11)])
+
+
+class Batch(unittest.TestCase):
+    def test_ranks_of_jobs(self):
+        self.assertIsNone(batch.ranks_of_job({}))
+        self.assertEqual(batch.ranks_of_job({"SLURM_NTASKS": "12"}), 12)
+        self.assertEqual(batch.ranks_of_job({"PBS_NP": "6"}), 6)
+        with tempfile.NamedTemporaryFile("w", suffix=".nodes") as nodes:
+            nodes.write("a\na\nb\n")
+            nodes.flush()
+            self.assertEqual(batch.ranks_of_job({"PBS_NODEFILE": nodes.name}), 3)
+
+    def test_series_ends_at_all_ranks(self):
+        self.assertEqual(batch.default_ranks({"SLURM_NTASKS": "12"}, 2), [1, 2, 4, 8, 12])
+        self.assertEqual(batch.default_ranks({}, 2), [1, 2])
+
+    def test_commands(self):
+        self.assertEqual(batch.command(batch.launcher({}), 4, ["x"]), ["mpirun", "-n", "4", "x"])
+        self.assertEqual(batch.launcher({"SLURM_JOB_ID": "1"}).split()[0], "srun")
+
+    def test_oversubscribes_only_here(self):
+        self.assertIn("OMPI_MCA_rmaps_base_oversubscribe", batch.environment_for_runs({}))
+        self.assertNotIn("OMPI_MCA_rmaps_base_oversubscribe", batch.environment_for_runs({"SLURM_NTASKS": "2"}))
+        self.assertEqual(batch.environment_for_runs({"OMP_NUM_THREADS": "4"})["OMP_NUM_THREADS"], "4")
+
+
+class Series(unittest.TestCase):
+    def test_strong_series_on_one_and_two_ranks(self):
+        with tempfile.TemporaryDirectory() as folder:
+            out = Path(folder) / "strong.json"
+            done = subprocess.run(
+                [sys.executable, str(ROOT / "tools/scaling"), "strong", "--ranks", "1", "2", "--particles", "6000",
+                 "--steps", "64", "--repeats", "1", "--network", "1e-6", "1e9", "--gravity", "direct", "--program",
+                 os.environ["BRECCIA_COMMAND"], "--launcher", os.environ["BRECCIA_MPIRUN"] + " -n {ranks}", "--json",
+                 str(out)], capture_output=True, text=True, check=False)
+            self.assertTrue(out.exists(), done.stdout + done.stderr)
+            results = json.loads(out.read_text())
+        self.assertEqual([r["ranks"] for r in results["runs"]], [1, 2])
+        one, two = results["runs"]
+        self.assertEqual(one["particles"], 6000)
+        self.assertEqual(one["slabs"]["halo_bytes_max"], 0)
+        self.assertLess(two["slabs"]["imbalance_mean"], 1.3)
+        rows = results["model"]["rows"]
+        # Fitted to this run.
+        self.assertAlmostEqual(rows[0]["predicted"] / rows[0]["measured"], 1.0, delta=0.05)
+        # Whole blocks of a sphere of twelve cells: a third more than its section and margin at most.
+        self.assertLess(abs(math.log(rows[1]["measured_halo_bytes"] / rows[1]["predicted_halo_bytes"])), math.log(1.4))
+
+
+if __name__ == "__main__":
+    unittest.main()

@@ -1,0 +1,1 @@
+"""What tools/scaling is made of: runs of a series, the performance model, pictures."""
