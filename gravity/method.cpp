@@ -8,9 +8,7 @@ namespace {
 // Below this the direct sum is faster on one core (measured; gravity.md 3), and exact.
 constexpr std::uint64_t kDirectParticles = 2000;
 
-// Below these errors the tree's float fields no longer follow the opening; of the mesh, errors down to about 4e-5 were
-// tested.
-constexpr double kSmallestTreeError = 1e-6;
+// Of the mesh, errors down to about 4e-5 were tested.
 constexpr double kSmallestMeshError = 3e-5;
 
 // Errors of a mesh are those of near neighbours, whose pull compares to the body's as spacing to radius: the split

@@ -16,6 +16,9 @@ struct Matter {
   int boxes = 0;
 };
 
+/// Below this error the float fields of the tree no longer follow the opening.
+inline constexpr double kSmallestTreeError = 1e-6;
+
 /// "off", "direct", "tree", "treepm" or "auto".
 const char* name_of(GravityMethod method);
 

@@ -3,6 +3,7 @@
 #include <type_traits>
 
 #include "breccia/pack.hpp"
+#include "gravity/pair_law.hpp"
 #include "gravity/rsqrt.hpp"
 
 namespace breccia::gravity::BRECCIA_ISA {
@@ -11,10 +12,6 @@ namespace {
 // Sources summed in Real before the sum goes to double: few enough to keep float sums at float rounding, enough to
 // make the conversion free. Their arrays stay in the first-level cache for a group of targets.
 constexpr std::int64_t kSourceBlock = 256;
-
-// Square of the distance below which two particles without softening count as one: q^3 must stay finite.
-template <class Real>
-constexpr Real kCoincidentSquared = std::is_same_v<Real, float> ? Real(1e-24) : Real(1e-100);
 
 // Subtracting zero is exact and vanishes, adding it (the pack's own broadcast) is an instruction: -0 + 0 is +0.
 template <class V>
@@ -67,7 +64,7 @@ void sum_block(const PairTask<typename V::Scalar>& task, std::int64_t i, std::in
     V q = rsqrt(r2);
     if constexpr (kGuarded) {
       const auto left_out =
-          (r2 <= broadcast<V>(kCoincidentSquared<Real>)) | is_self<V>(task.same ? j - i : std::int64_t{-1});
+          (r2 <= broadcast<V>(kCoincidentPair<Real>)) | is_self<V>(task.same ? j - i : std::int64_t{-1});
       q = select(left_out, V{}, q);
     }
     const V mq = broadcast<V>(task.sources.mass[j]) * q;
@@ -97,7 +94,7 @@ template <class Real>
 void sum_as(const PairTask<Real>& task) {
   using V = RegisterPack<Real>;
   const bool with_potential = task.potential != nullptr;
-  const bool guarded = task.softening_squared <= kCoincidentSquared<Real> || (task.same && with_potential);
+  const bool guarded = task.softening_squared <= kCoincidentPair<Real> || (task.same && with_potential);
   if (guarded) {
     with_potential ? sum_all<V, true, true>(task) : sum_all<V, true, false>(task);
   } else {

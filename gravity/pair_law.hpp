@@ -5,6 +5,10 @@
 
 namespace breccia::gravity {
 
+/// Square of the distance below which two particles without softening count as one: q^3 must stay finite.
+template <class Real>
+inline constexpr Real kCoincidentPair = sizeof(Real) == 4 ? Real(1e-24) : Real(1e-100);
+
 /// What a pair adds per unit of source mass: acceleration `force` d, potential -`depth`; d = source - target.
 template <class T>
 struct PairWeight {

@@ -1,12 +1,13 @@
-// Halo exchange around P2G and G2P: partial sums go to the owner of a node, updated velocities come back.
-// One packed message for each neighbour and phase; what is exchanged is fixed until the set of blocks changes.
+// Halo exchange around P2G and G2P: partial sums go to the owner of a node, updated velocities come back. Each of the
+// two is a NodeExchange: one packed message for each neighbour, by requests that stay until the messages change.
 #pragma once
 
 #include <cstdint>
-#include <span>
+#include <utility>
 #include <vector>
 
 #include "mpi/comm.hpp"
+#include "mpi/persistent.hpp"
 
 namespace breccia::mpi {
 
@@ -16,102 +17,93 @@ struct SharedNodes {
   std::vector<std::uint32_t> nodes;
 };
 
+/// Values of nodes on their way to other ranks and from them. Of one round: expect(), send(), arrived() as often as one
+/// likes, finish(), for_each_received(). All from the thread that started MPI.
 template <class Real, int kChannels>
-class Halo {
+class NodeExchange {
  public:
-  /// `touched`: nodes of this rank's arrays that other ranks own; `owned`: nodes this rank owns that others touch too.
-  /// Both are sorted by rank.
-  void set(std::vector<SharedNodes> touched, std::vector<SharedNodes> owned) {
-    touched_ = std::move(touched);
-    owned_ = std::move(owned);
-    touched_buffer_.resize(count(touched_) * kChannels);
-    owned_buffer_.resize(count(owned_) * kChannels);
+  /// `tag` tells exchanges of one communicator apart.
+  explicit NodeExchange(int tag) : messages_(tag) {}
+
+  /// Which nodes are sent and received from now on, sorted by rank. Between two rounds. Requests stay as they are if
+  /// ranks and lengths do.
+  void set(std::vector<SharedNodes> sent, std::vector<SharedNodes> received, const Comm& comm) {
+    sent_ = std::move(sent);
+    received_ = std::move(received);
+    messages_.set(lengths(sent_), lengths(received_), comm);
   }
 
-  /// Adds the partial sums of other ranks to the nodes this rank owns and clears what it sent away. The order of
-  /// addition is that of the ranks, so a run repeats bit for bit.
-  void add_to_owners(Real* nodes, const Comm& comm) {
-    pack(touched_, nodes, touched_buffer_);
-    exchange(touched_, touched_buffer_, owned_, owned_buffer_, comm);
-    const Real* from = owned_buffer_.data();
-    for (const SharedNodes& peer : owned_) {
+  [[nodiscard]] bool empty() const { return sent_.empty() && received_.empty(); }
+  /// Between send() and finish().
+  [[nodiscard]] bool travelling() const { return messages_.travelling(); }
+  /// Bytes this rank sends in a round.
+  [[nodiscard]] std::size_t bytes() const { return messages_.sent().size() * sizeof(Real); }
+  [[nodiscard]] const Flights& flights() const { return messages_.flights(); }
+
+  /// Lets messages of faster ranks in.
+  void expect() { messages_.expect(); }
+  /// Packs the nodes and posts the messages.
+  void send(const Real* nodes) {
+    Real* to = messages_.sent().data();
+    for (const SharedNodes& peer : sent_) {
       for (const std::uint32_t node : peer.nodes) {
-        for (int c = 0; c < kChannels; ++c)
-          nodes[std::size_t{node} * kChannels + static_cast<std::size_t>(c)] += from[c];
-        from += kChannels;
-      }
-    }
-    for (const SharedNodes& peer : touched_) {
-      for (const std::uint32_t node : peer.nodes) {
-        for (int c = 0; c < kChannels; ++c)
-          nodes[std::size_t{node} * kChannels + static_cast<std::size_t>(c)] = Real(0);
-      }
-    }
-  }
-
-  /// Gives the values of owned nodes to the ranks that touch them.
-  void share_from_owners(Real* nodes, const Comm& comm) {
-    pack(owned_, nodes, owned_buffer_);
-    exchange(owned_, owned_buffer_, touched_, touched_buffer_, comm);
-    const Real* from = touched_buffer_.data();
-    for (const SharedNodes& peer : touched_) {
-      for (const std::uint32_t node : peer.nodes) {
-        for (int c = 0; c < kChannels; ++c)
-          nodes[std::size_t{node} * kChannels + static_cast<std::size_t>(c)] = from[c];
-        from += kChannels;
-      }
-    }
-  }
-
-  /// Bytes this rank sends in one step.
-  [[nodiscard]] std::size_t bytes_per_step() const {
-    return (touched_buffer_.size() + owned_buffer_.size()) * sizeof(Real);
-  }
-
- private:
-  static std::size_t count(const std::vector<SharedNodes>& peers) {
-    std::size_t n = 0;
-    for (const SharedNodes& peer : peers) n += peer.nodes.size();
-    return n;
-  }
-
-  static void pack(const std::vector<SharedNodes>& peers, const Real* nodes, std::vector<Real>& buffer) {
-    Real* to = buffer.data();
-    for (const SharedNodes& peer : peers) {
-      for (const std::uint32_t node : peer.nodes) {
-        for (int c = 0; c < kChannels; ++c) to[c] = nodes[std::size_t{node} * kChannels + static_cast<std::size_t>(c)];
+        for (int c = 0; c < kChannels; ++c) to[c] = nodes[at(node, c)];
         to += kChannels;
       }
     }
+    messages_.send();
+  }
+  /// True once everything expected is here. Open MPI moves long messages only while a rank is inside of it: to be
+  /// called every now and then.
+  [[nodiscard]] bool arrived() { return messages_.arrived(); }
+  /// Waits until everything is here and all that was sent has left.
+  void finish() { messages_.finish(); }
+
+  /// Calls visit(node, values) for what came, in the order of the ranks: sums then repeat bit for bit.
+  template <class F>
+  void for_each_received(F&& visit) const {
+    const Real* from = messages_.received().data();
+    for (const SharedNodes& peer : received_) {
+      for (const std::uint32_t node : peer.nodes) {
+        visit(node, from);
+        from += kChannels;
+      }
+    }
+  }
+  /// Adds what came to the nodes.
+  void add_received(Real* nodes) const {
+    for_each_received([&](std::uint32_t node, const Real* from) {
+      for (int c = 0; c < kChannels; ++c) nodes[at(node, c)] += from[c];
+    });
+  }
+  /// Makes what came the values of the nodes.
+  void take_received(Real* nodes) const {
+    for_each_received([&](std::uint32_t node, const Real* from) {
+      for (int c = 0; c < kChannels; ++c) nodes[at(node, c)] = from[c];
+    });
+  }
+  /// Sets the nodes that were sent to 0.
+  void clear_sent(Real* nodes) const {
+    for (const SharedNodes& peer : sent_) {
+      for (const std::uint32_t node : peer.nodes) {
+        for (int c = 0; c < kChannels; ++c) nodes[at(node, c)] = Real(0);
+      }
+    }
   }
 
-  void exchange(const std::vector<SharedNodes>& to, const std::vector<Real>& send, const std::vector<SharedNodes>& from,
-                std::vector<Real>& receive, const Comm& comm) {
-    requests_.clear();
-    std::size_t at = 0;
-    for (const SharedNodes& peer : from) {
-      const std::size_t n = peer.nodes.size() * kChannels;
-      requests_.emplace_back();
-      MPI_Irecv(receive.data() + at, static_cast<int>(n), datatype<Real>(), peer.rank, 1, comm.handle(),
-                &requests_.back());
-      at += n;
-    }
-    at = 0;
-    for (const SharedNodes& peer : to) {
-      const std::size_t n = peer.nodes.size() * kChannels;
-      requests_.emplace_back();
-      MPI_Isend(send.data() + at, static_cast<int>(n), datatype<Real>(), peer.rank, 1, comm.handle(),
-                &requests_.back());
-      at += n;
-    }
-    MPI_Waitall(static_cast<int>(requests_.size()), requests_.data(), MPI_STATUSES_IGNORE);
+ private:
+  static constexpr std::size_t at(std::uint32_t node, int channel) {
+    return std::size_t{node} * kChannels + static_cast<std::size_t>(channel);
+  }
+  static std::vector<MessageLength> lengths(const std::vector<SharedNodes>& peers) {
+    std::vector<MessageLength> all;
+    for (const SharedNodes& peer : peers) all.push_back({peer.rank, peer.nodes.size() * kChannels});
+    return all;
   }
 
-  std::vector<SharedNodes> touched_;
-  std::vector<SharedNodes> owned_;
-  std::vector<Real> touched_buffer_;
-  std::vector<Real> owned_buffer_;
-  std::vector<MPI_Request> requests_;
+  std::vector<SharedNodes> sent_;
+  std::vector<SharedNodes> received_;
+  PersistentMessages<Real> messages_;
 };
 
 }  // namespace breccia::mpi

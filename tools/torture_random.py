@@ -139,11 +139,10 @@ class Scene:
         weak = 6.7e-11 * (self.density * self.size) ** 2 < 0.02 * self.bulk
         gravity = draw.choice(("off", "off", "direct", "tree", "treepm", "auto"))
         gravity = gravity if weak else "off"
-        # The step is chosen once a window: more than 32 steps are too many for a shock that forms within one.
         lines = ["[effects]", f'gravity = "{gravity}"', f"energy = {str(self.energy).lower()}"]
         for name in ("shear", "strength", "damage", "viscosity"):
             lines += self.maybe(f"{name} = {draw.choice(('false', chr(34) + 'auto' + chr(34)))}")
-        lines += ["[gravity]"] + self.maybe(f"interval = {draw.choice((1, 3, 8, 32, 16))}", 0.6)
+        lines += ["[gravity]"] + self.maybe(f"interval = {draw.choice((1, 3, 8, 32, 64, 200))}", 0.6)
         if self.uniform:
             lines += [f'uniform = [0, 0, "{-0.01 * self.sound**2 / self.size:.6g} m/s2"]']
         return lines

@@ -88,7 +88,7 @@ class Opener {
   // |T - centre| + R <= reach: their particles are at least D - reach away, and so is T by R more.
   [[nodiscard]] static bool may_be_opened(const Cell& source, const Cell& leaf, double reach, double allowed) {
     if (source.count <= kFewParticles) return true;
-    if (leaf.count <= kGroupParticles) return opening(source, leaf, allowed) == Opening::kOpen;
+    if (leaf.count <= kSparseGroupParticles) return opening(source, leaf, allowed) == Opening::kOpen;
     const Vec3d d = leaf.centre - source.centre;
     const double nearest = (1.0 - 1e-9) * (std::sqrt(dot(d, d)) - reach);
     const double b = source.radius;

@@ -6,10 +6,6 @@
 namespace breccia::gravity::BRECCIA_ISA {
 namespace {
 
-// Square of the distance below which two particles without softening count as one: q^3 must stay finite.
-template <class Real>
-constexpr Real kCoincidentSquared = std::is_same_v<Real, float> ? Real(1e-24) : Real(1e-100);
-
 template <class V, bool kPotential>
 void add_far(const LocalExpansion<double>& far, const Relative<typename V::Scalar>& targets, std::int64_t padded,
              const Sums& sums) {
@@ -68,8 +64,8 @@ void add_particles(const GroupTask<typename V::Scalar>& task, const Relative<typ
                    std::int64_t padded, typename V::Scalar* memory, const Sums& sums) {
   using Real = typename V::Scalar;
   const V softening_squared(task.softening_squared);
-  if (task.softening_squared <= kCoincidentSquared<Real>) {
-    const NewtonPair<V, true> pair{softening_squared, V(kCoincidentSquared<Real>)};
+  if (task.softening_squared <= kCoincidentPair<Real>) {
+    const NewtonPair<V, true> pair{softening_squared, V(kCoincidentPair<Real>)};
     add_ranges<V, kLow, kPotential>(task, targets, padded, memory, pair, sums);
   } else {
     const NewtonPair<V, false> pair{softening_squared, V{}};

@@ -18,7 +18,7 @@ struct Root {
   double side = 1.0;  ///< [m]
   double unit = 1.0;  ///< [m]
 
-  [[nodiscard]] Vec3d scaled(Vec3d x) const { return (1.0 / unit) * (x - corner); }
+  [[nodiscard]] BRECCIA_HD Vec3d scaled(Vec3d x) const { return (1.0 / unit) * (x - corner); }
 };
 
 /// Bits 0..20 of `x` to every third bit.

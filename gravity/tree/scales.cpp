@@ -8,31 +8,17 @@
 #include <limits>
 #include <span>
 
+#include "gravity/tree/scale_rules.hpp"
 #include "gravity/tree/workspace.hpp"
 
 namespace breccia::gravity {
 namespace {
 
-// One register of targets.
-constexpr int kSamples = 16;
-
-// Cells are opened where (b + R)/D exceeds this; three quarters of the fields then are right to a percent.
-constexpr double kScaleOpening = 1.0;
-
-// Cells of this share of the mass tell how strong the field is at least.
-constexpr double kHeavy = 1.0 / 16.0;
-// A cell whose field at its own radius is weaker by this factor than that is opened only from deep inside: around a body,
-// debris fills many wide cells of little mass.
-constexpr double kFaint = 0.1;
-constexpr double kDeepInside = 0.5;
-
 struct Sampling {
   Workspace<float> work;
   std::vector<std::int32_t> stack;
-  double sums[3][kSamples];
+  double sums[3][kScaleSamples];
 };
-
-double square(double x) { return x * x; }
 
 // Cells of the coarse tree only: all ranks know them.
 std::vector<std::int32_t> heavy_cells(const Tree& tree) {
@@ -58,16 +44,8 @@ std::vector<std::int32_t> heavy_cells(const Tree& tree) {
 // The strongest pull of a heavy cell, from where it is farthest.
 double least_field(const Tree& tree, std::span<const std::int32_t> heavy, const Cell& group) {
   double field = 0.0;
-  for (const std::int32_t c : heavy) {
-    const Cell& cell = tree.cell(c);
-    const Vec3d d = group.centre - cell.centre;
-    field = std::max(field, cell.moments.mass / square(std::sqrt(dot(d, d)) + cell.radius + group.radius));
-  }
+  for (const std::int32_t c : heavy) field = std::max(field, least_pull(tree.cell(c), group));
   return field;
-}
-
-bool contains(const Cell& outer, const Cell& inner) {
-  return outer.end > outer.begin && outer.begin <= inner.begin && outer.end >= inner.end;
 }
 
 // Cells of the coarse tree as the group sees them; the coarse cell it belongs to is left out.
@@ -81,15 +59,9 @@ void list_coarse_cells(const Tree& tree, std::span<const std::int32_t> heavy, co
     s.stack.pop_back();
     const Cell& cell = tree.cell(c);
     const bool own = contains(cell, group);
-    if (cell.count > coarse && !cell.is_leaf()) {
-      const Vec3d d = group.centre - cell.centre;
-      const double d2 = dot(d, d);
-      const bool near = square(cell.radius + 0.5 * group.radius) >= square(kScaleOpening) * d2;
-      const bool strong = cell.moments.mass >= faint * square(cell.radius) || d2 < square(kDeepInside * cell.radius);
-      if (own || (near && strong)) {
-        for (int k = 0; k < cell.children; ++k) s.stack.push_back(cell.first_child + k);
-        continue;
-      }
+    if (cell.count > coarse && !cell.is_leaf() && (own || opened_for_scale(cell, group, faint))) {
+      for (int k = 0; k < cell.children; ++k) s.stack.push_back(cell.first_child + k);
+      continue;
     }
     if (!own) s.work.cells.push_back(c);
   }
@@ -98,17 +70,17 @@ void list_coarse_cells(const Tree& tree, std::span<const std::int32_t> heavy, co
 double scale_of(const Tree& tree, std::span<const std::int32_t> heavy, const Cell& group, double softening,
                 Sampling& s) {
   list_coarse_cells(tree, heavy, group, s);
-  double position[3][kSamples];
-  double mass[kSamples] = {};
-  for (int k = 0; k < kSamples; ++k) {
-    const Vec3d x = tree.particles.position(group.begin + k * (group.end - group.begin) / kSamples);
+  double position[3][kScaleSamples];
+  double mass[kScaleSamples] = {};
+  for (int k = 0; k < kScaleSamples; ++k) {
+    const Vec3d x = tree.particles.position(group.begin + k * (group.end - group.begin) / kScaleSamples);
     position[0][k] = x.x;
     position[1][k] = x.y;
     position[2][k] = x.z;
   }
   GroupTask<float> task{};
   task.targets = {{position[0], position[1], position[2]}, mass};
-  task.end = kSamples;
+  task.end = kScaleSamples;
   task.centre = group.centre;
   task.softening_squared = static_cast<float>(softening * softening);
   for (int axis = 0; axis < 3; ++axis) task.acceleration[axis] = s.sums[axis];
@@ -117,7 +89,7 @@ double scale_of(const Tree& tree, std::span<const std::int32_t> heavy, const Cel
   interaction_kernels<float>().evaluate_group(task);
 
   double least = std::numeric_limits<double>::max();
-  for (int k = 0; k < kSamples; ++k) {
+  for (int k = 0; k < kScaleSamples; ++k) {
     least = std::min(least, std::hypot(s.sums[0][k], s.sums[1][k], s.sums[2][k]));
   }
   return least;
@@ -144,6 +116,12 @@ std::vector<double> acceleration_scales(const Tree& tree, std::span<const Cell> 
     double scale = scale_of(tree, heavy, group, softening, sampling[static_cast<std::size_t>(omp_get_thread_num())]);
     for (const Cell& other : others) scale = std::max(scale, pull_of_whole(other, group));
     scales[static_cast<std::size_t>(targets[g])] = scale;
+  }
+  for (std::size_t i = 0; i < tree.cells.size(); ++i) {  // parents come first
+    const Cell& cell = tree.cells[i];
+    for (std::int32_t c = 0; c < cell.children && cell.is_group(); ++c) {
+      scales[static_cast<std::size_t>(cell.first_child + c)] = scales[i];
+    }
   }
   take_least_of_children(tree, scales.size(), scales);
   return scales;

@@ -7,12 +7,6 @@
 #include "gravity/tree/scales.hpp"
 
 namespace breccia::gravity {
-namespace {
-
-constexpr std::size_t kMostChildren = 8;
-
-}  // namespace
-
 // What all ranks together have in some cells.
 class SharedTree::Census {
  public:
@@ -285,7 +279,7 @@ double SharedTree::reach_of(const Cell& leaf) const {
   double reach = leaf.radius;
   std::vector<std::int32_t> stack;
   const auto push_children = [&](const Cell& c) {
-    for (std::int32_t k = 0; k < c.children && !c.is_group(); ++k) stack.push_back(c.first_child + k);
+    for (std::int32_t k = 0; k < c.children && !c.is_smallest_group(); ++k) stack.push_back(c.first_child + k);
   };
   push_children(leaf);
   while (!stack.empty()) {

@@ -10,48 +10,9 @@
 namespace breccia::gravity {
 namespace {
 
-constexpr int kMostChildren = 8;
 constexpr std::uint32_t kRootStream = 0x67726176;
 
-std::uint64_t prefix(std::uint64_t key, int bits) { return bits == 0 ? 0 : key >> (kKeyBits - bits); }
-
-double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
-
-Sym3<double> square(Vec3d d) { return {d.x * d.x, d.y * d.y, d.z * d.z, d.x * d.y, d.x * d.z, d.y * d.z}; }
-
-void set_leaf_moments(const SortedParticles& p, Cell& cell) {
-  Vec3d weighted{};
-  Vec3d mean{};
-  double mass = 0.0;
-  for (std::int64_t i = cell.begin; i < cell.end; ++i) {
-    const double m = p.mass[static_cast<std::size_t>(i)];
-    mass += m;
-    weighted += m * p.position(i);
-    mean += p.position(i);
-  }
-  cell.centre = mass > 0.0 ? (1.0 / mass) * weighted : (1.0 / static_cast<double>(cell.end - cell.begin)) * mean;
-  cell.moments = {mass, {}};
-  for (std::int64_t i = cell.begin; i < cell.end; ++i) {
-    cell.moments.second =
-        cell.moments.second + p.mass[static_cast<std::size_t>(i)] * square(p.position(i) - cell.centre);
-  }
-}
-
 }  // namespace
-
-Split split_of(std::int64_t count, int key_bits, std::uint64_t low, std::uint64_t high) {
-  const std::int64_t limit = count > kGroupParticles ? kGroupParticles : kLeafParticles;
-  if (count <= kLeafParticles || low == high) return {};
-  const int shared = std::max(key_bits, kKeyBits - static_cast<int>(std::bit_width(low ^ high)));
-  // Enough bits to come down to the limit if the particles are spread evenly. Cubes split into cubes.
-  const int needed = count > 4 * limit ? 3 : (count > 2 * limit ? 2 : 1);
-  const int start = needed == 3 ? std::max(key_bits, shared - shared % 3) : shared;
-  return {start, std::min(needed, kKeyBits - start)};
-}
-
-std::int64_t coarse_limit(std::int64_t all_particles) {
-  return std::max(kGroupParticles, all_particles / kCoarseCells);
-}
 
 Root random_root(Vec3d low, Vec3d high) {
   const Vec3d extent = high - low;
@@ -181,7 +142,9 @@ std::vector<std::int32_t> Tree::groups() const {
 
 void Tree::set_moments(Cell& c) const {
   if (c.is_leaf()) {
-    set_leaf_moments(particles, c);
+    set_leaf_moments(
+        c, [&](std::int64_t i) { return particles.position(i); },
+        [&](std::int64_t i) { return particles.mass[static_cast<std::size_t>(i)]; });
   } else {
     combine_children(c);
   }
@@ -197,24 +160,6 @@ double Tree::farthest_squared(const Cell& c) const {
   return farthest;
 }
 
-void Tree::combine_children(Cell& c) const {
-  Vec3d weighted{};
-  Vec3d mean{};
-  double mass = 0.0;
-  for (const Cell& child : children(c)) {
-    mass += child.moments.mass;
-    weighted += child.moments.mass * child.centre;
-    mean += static_cast<double>(child.count) * child.centre;
-  }
-  c.centre = mass > 0.0 ? (1.0 / mass) * weighted : (1.0 / static_cast<double>(c.count)) * mean;
-  c.moments = {mass, {}};
-  double radius = 0.0;
-  for (const Cell& child : children(c)) {
-    const Vec3d d = child.centre - c.centre;
-    c.moments.second = c.moments.second + child.moments.second + child.moments.mass * square(d);
-    radius = std::max(radius, norm(d) + child.radius);
-  }
-  c.radius = radius;
-}
+void Tree::combine_children(Cell& c) const { gravity::combine_children(c, children(c).data()); }
 
 }  // namespace breccia::gravity

@@ -4,32 +4,18 @@
 // leaves then are filled to between half and all of their limit wherever the root cube happens to lie.
 #pragma once
 
-#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
 
 #include "gravity/solver.hpp"
 #include "gravity/tree/cell.hpp"
+#include "gravity/tree/cell_moments.hpp"
 #include "gravity/tree/morton.hpp"
 #include "gravity/tree/radix_sort.hpp"
+#include "gravity/tree/splitting.hpp"
 
 namespace breccia::gravity {
-
-/// Cells of more particles than max(group, all/kCoarseCells) make up the coarse tree, of which scales are sampled.
-inline constexpr std::int64_t kCoarseCells = 1024;
-
-/// How a cell splits: its children differ in `bits` key bits after the first `start`.
-struct Split {
-  int start = 0;
-  int bits = 0;
-};
-
-/// `low` and `high`: smallest and largest key of the cell, of all ranks; bits = 0 for a leaf.
-Split split_of(std::int64_t count, int key_bits, std::uint64_t low, std::uint64_t high);
-
-/// Cells of more particles belong to the coarse tree.
-std::int64_t coarse_limit(std::int64_t all_particles);
 
 /// Sorted particles, coordinates scaled (Root::scaled). What other ranks sent (SharedTree) follows and has no key and
 /// no order.
@@ -51,12 +37,6 @@ struct SortedParticles {
     return {x[k], y[k], z[k]};
   }
 };
-
-/// The radius of cells of more particles follows from their children.
-inline constexpr std::int64_t kExactRadius = 4096;
-
-/// What encloses particles at this square of a distance. Rounded up: a particle must not stick out.
-inline double enclosing_radius(double farthest_squared) { return std::sqrt(farthest_squared) * (1.0 + 1e-12); }
 
 class Tree {
  public:

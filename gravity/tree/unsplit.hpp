@@ -9,11 +9,9 @@
 
 #include "gravity/evaluation.hpp"
 #include "gravity/tree/shared_tree.hpp"
+#include "gravity/tree/tolerance.hpp"
 
 namespace breccia::gravity {
-
-/// Parameters::opening, or what leaves Parameters::error.
-double opening_for(const Parameters& parameters);
 
 /// Sets of particles: 0 outside of all boxes, k inside box k. Particles of set 0 feel all others, those of set k feel
 /// all that are not in set k. Each set has a tree that is the same on any number of ranks (SharedTree); what a rank

@@ -121,7 +121,7 @@ class Walker {
            w.spread});
       return;
     }
-    if (cell.is_group()) return sum_group(w, t, from, far);
+    if (cell.is_group() && !is_sparse(w, cell, from)) return sum_group(w, t, from, far);
     LocalExpansion<double> own = far;
     const double spread = w.spread;
     const Candidates rest = separate(w, t, from, own);
@@ -131,6 +131,19 @@ class Walker {
     }
     w.candidates.resize(rest.begin);
     w.spread = spread;
+  }
+
+  // Whether the group is to be divided: something larger near it is denser by far.
+  [[nodiscard]] bool is_sparse(const Walking<Real>& w, const Cell& group, Candidates from) const {
+    constexpr double kDenser = 64.0;
+    if (group.is_smallest_group()) return false;
+    const auto cube = [](double x) { return x * x * x; };
+    const double density = kDenser * group.moments.mass / cube(group.radius);
+    for (std::size_t k = from.begin; k < from.end; ++k) {
+      const Cell& source = sources_.cell(w.candidates[k]);
+      if (source.count > group.count && source.moments.mass > density * cube(source.radius)) return true;
+    }
+    return false;
   }
 
   // How each of the cells in w.level is to be taken.

@@ -88,6 +88,8 @@ struct NumericsParameters {
   int sort_interval = 32;         ///< most steps between two sortings
   double energy_gain = 0.5;       ///< largest gain of energy over max(kinetic + |potential|)
   bool lone_without_grid = true;  ///< closed form for particles that share no node with another one
+  bool overlap = true;            ///< messages between ranks travel while tiles inside a slab are computed
+  bool reproducible = false;      ///< the same bits on any number of ranks
   LiteralSwitches literal;
 };
 

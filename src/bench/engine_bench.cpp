@@ -37,10 +37,21 @@ struct Measured {
   double bytes_per_particle = 0.0;
 };
 
-Measured measure(const EngineCase& c, const EffectChoice& effects, Precision precision, int threads, double seconds) {
-  const Scene scene = make_scene(c, effects, precision);
-  const mpi::Comm self(MPI_COMM_SELF);
-  const auto engine = sim::make_loaded_engine(scene, sim::resolve_effects(scene), make_state(c, scene), threads, self);
+// What is measured together: a state, its effects, and whether bits may depend on the number of ranks.
+struct Row {
+  EngineCase state;
+  EffectChoice effects;
+  bool reproducible = false;
+
+  [[nodiscard]] std::string name() const { return std::string(effects.name) + (reproducible ? ", reproducible" : ""); }
+};
+
+Measured measure(const Row& row, Precision precision, int threads, double seconds, const mpi::Comm& comm) {
+  const EngineCase& c = row.state;
+  Scene scene = make_scene(c, row.effects, precision);
+  scene.numerics.reproducible = row.reproducible;
+  const auto engine =
+      sim::make_loaded_engine(scene, sim::resolve_effects(scene), make_state(c, scene, comm), threads, comm);
   const double dt = *scene.time.step;
   const int interval = scene.numerics.sort_interval;
   engine->scatter(0.5 * dt);
@@ -50,17 +61,19 @@ Measured measure(const EngineCase& c, const EffectChoice& effects, Precision pre
   Measured best;
   double spent = 0.0;
   for (int cycle = 0; cycle < 3 || spent < seconds; ++cycle) {
+    comm.barrier();
     const double user = now().user;
     const double wall = MPI_Wtime();
     one_cycle(*engine, dt, interval);
-    const double elapsed = MPI_Wtime() - wall;
-    best.rate = std::max(best.rate, steps / (now().user - user));
+    const double of_all_ranks = comm.sum(now().user - user);
+    const double elapsed = comm.max(MPI_Wtime() - wall);
+    best.rate = std::max(best.rate, steps / of_all_ranks);
     best.wall_rate = std::max(best.wall_rate, steps / elapsed);
     spent += elapsed;
   }
   const grid::EngineStats stats = engine->stats();
-  best.bytes_per_particle =
-      static_cast<double>(stats.particle_bytes + stats.grid_bytes) / static_cast<double>(stats.particles);
+  best.bytes_per_particle = static_cast<double>(comm.sum(stats.particle_bytes + stats.grid_bytes)) /
+                            static_cast<double>(comm.sum(stats.particles));
   return best;
 }
 
@@ -88,11 +101,8 @@ const char* name_of(Precision precision) {
   return precision == Precision::kMixed ? MixedPrecision::kName : DoublePrecision::kName;
 }
 
-// The lines of the table: every state with all effects, and the paper's with one effect less at a time.
-struct Row {
-  EngineCase state;
-  EffectChoice effects;
-};
+// The lines of the table: every state with all effects, and the paper's with one effect less at a time and with the
+// same bits on any number of ranks.
 std::vector<Row> rows(const EngineBenchOptions& options) {
   const bool standard = options.cases.empty() && options.effects.empty();
   std::vector<std::string> cases = options.cases;
@@ -104,8 +114,14 @@ std::vector<Row> rows(const EngineBenchOptions& options) {
   for (const EngineCase& c : chosen(engine_cases(), cases)) {
     for (const EffectChoice& e : chosen(effect_choices(), effects)) all.push_back({c, e});
   }
+  if (options.reproducible) {
+    for (std::size_t n = all.size(); n-- > 0;) {
+      all.insert(all.begin() + static_cast<std::ptrdiff_t>(n) + 1, {all[n].state, all[n].effects, true});
+    }
+  }
   if (standard && !options.quick) {
     for (const EffectChoice& e : effect_choices().subspan(1)) all.push_back({engine_cases().front(), e});
+    all.push_back({engine_cases().front(), effect_choices().front(), true});
   }
   return all;
 }
@@ -117,29 +133,36 @@ void run_engine_bench(const EngineBenchOptions& options) {
   const std::vector<int> cores = options.cores.empty() ? std::vector<int>{1, 2} : options.cores;
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
   const io::Machine machine = io::this_machine();
+  const mpi::Comm comm;
   std::FILE* table = options.json == "-" ? stderr : stdout;
-  fmt::print(table, "{}, {}, {}; no gravity, sorting included, best cycle of {} steps\n", machine.cpu_model,
-             isa_name(active_isa()), io::library_versions().at(1).second, NumericsParameters{}.sort_interval);
-  fmt::print(table, "{:<10} {:<13} {:<6} {:>5} {:>24} {:>24} {:>15}\n", "case", "effects", "prec.", "cores",
-             "Mp-steps/s of CPU time", "Mp-steps/s of wall time", "bytes/particle");
+  if (comm.is_root()) {
+    fmt::print(table, "{}, {}, {}; {} ranks; no gravity, sorting included, best cycle of {} steps\n", machine.cpu_model,
+               isa_name(active_isa()), io::library_versions().at(1).second, comm.size(),
+               NumericsParameters{}.sort_interval);
+    fmt::print(table, "{:<10} {:<20} {:<6} {:>5} {:>24} {:>24} {:>15}\n", "case", "effects", "prec.", "cores",
+               "Mp-steps/s of CPU time", "Mp-steps/s of wall time", "bytes/particle");
+  }
   for (const Row& row : table_rows) {
     for (const Precision precision : chosen_precisions(options.precision)) {
       for (const int threads : cores) {
-        const Measured m = measure(row.state, row.effects, precision, threads, options.seconds);
-        fmt::print(table, "{:<10} {:<13} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}\n", row.state.name, row.effects.name,
-                   name_of(precision), threads, 1e-6 * m.rate, 1e-6 * m.wall_rate, m.bytes_per_particle);
+        const Measured m = measure(row, precision, threads, options.seconds, comm);
+        if (!comm.is_root()) continue;
+        fmt::print(table, "{:<10} {:<20} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}\n", row.state.name, row.name(),
+                   name_of(precision), threads * comm.size(), 1e-6 * m.rate, 1e-6 * m.wall_rate, m.bytes_per_particle);
         std::fflush(table);
         results.push_back({{"case", row.state.name},
                            {"precision", name_of(precision)},
-                           {"cores", threads},
-                           {"effects", row.effects.name},
-                           {"particle_steps_per_second", threads == 1 ? m.rate : m.wall_rate},
+                           {"cores", threads * comm.size()},
+                           {"ranks", comm.size()},
+                           {"effects", row.name()},
+                           {"particle_steps_per_second", threads * comm.size() == 1 ? m.rate : m.wall_rate},
                            {"particle_steps_per_cpu_second", m.rate},
                            {"particle_steps_per_wall_second", m.wall_rate},
                            {"bytes_per_particle", m.bytes_per_particle}});
       }
     }
   }
+  if (!comm.is_root()) return;
   const nlohmann::ordered_json document = {{"machine", machine.cpu_model},
                                            {"instruction_set", isa_name(active_isa())},
                                            {"compiler", io::library_versions().at(1).second},

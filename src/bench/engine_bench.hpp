@@ -13,11 +13,13 @@ struct EngineBenchOptions {
   std::vector<std::string> effects;  ///< names of effect_choices()
   std::string precision;             ///< mixed or double; empty: both
   std::vector<int> cores;            ///< threads
+  bool reproducible = false;         ///< each state a second time with numerics.reproducible
   double seconds = 6.0;              ///< least time of a measurement
   std::string json;                  ///< file for the results, "-" for standard output, empty for none
 };
 
-/// Measures particle-steps/s and bytes per particle and prints a line for each combination. Throws UsageError for a
+/// Measures particle-steps/s and bytes per particle on all ranks together and prints a line for each combination.
+/// Collective. Throws UsageError for a
 /// name that is unknown and IoError if the file cannot be written.
 void run_engine_bench(const EngineBenchOptions& options);
 

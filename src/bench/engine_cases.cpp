@@ -55,14 +55,16 @@ Scene make_scene(const EngineCase& c, const EffectChoice& effects, Precision pre
   return scene;
 }
 
-ParticleArrays make_state(const EngineCase& c, const Scene& scene) {
-  ParticleArrays particles = scene::make_particles(scene, mpi::Comm(MPI_COMM_SELF));
+ParticleArrays make_state(const EngineCase& c, const Scene& scene, const mpi::Comm& comm) {
+  ParticleArrays particles = scene::make_particles(scene, comm);
   if (c.debris_share == 0.0) return particles;
   const auto stride = static_cast<std::size_t>(std::lround(1.0 / c.debris_share));
   const RandomStream random(1, 0);
-  for (std::size_t i = 0; i < particles.size(); i += stride) {
-    const auto [a, b] = random.uniform(i, 0);
-    const auto [u, unused] = random.uniform(i, 1);
+  for (std::size_t i = 0; i < particles.size(); ++i) {
+    const std::uint64_t id = particles.id[i];
+    if (id % stride != 0) continue;
+    const auto [a, b] = random.uniform(id, 0);
+    const auto [u, unused] = random.uniform(id, 1);
     static_cast<void>(unused);
     // Evenly in radius: most of the debris of an impact is slow and still near.
     const double r = kDebrisRadius * u;

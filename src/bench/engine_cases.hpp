@@ -7,6 +7,7 @@
 
 #include "breccia/particle_arrays.hpp"
 #include "breccia/scene.hpp"
+#include "mpi/comm.hpp"
 
 namespace breccia::bench {
 
@@ -33,7 +34,7 @@ std::span<const EffectChoice> effect_choices();
 
 Scene make_scene(const EngineCase& c, const EffectChoice& effects, Precision precision);
 
-/// The particles of the scene; the share that is debris is taken evenly from the spheres and scattered.
-ParticleArrays make_state(const EngineCase& c, const Scene& scene);
+/// This rank's share of the particles of the scene; what is debris is taken evenly from the spheres and scattered.
+ParticleArrays make_state(const EngineCase& c, const Scene& scene, const mpi::Comm& comm);
 
 }  // namespace breccia::bench

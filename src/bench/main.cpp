@@ -22,6 +22,7 @@ int measure(int argc, char** argv) {
   engine->add_option("--precision", options.precision, "mixed or double")->check(CLI::IsMember({"mixed", "double"}));
   engine->add_option("--cores", options.cores, "numbers of threads")->check(CLI::PositiveNumber);
   engine->add_option("--seconds", options.seconds, "least time of a measurement")->capture_default_str();
+  engine->add_flag("--reproducible", options.reproducible, "each state also with numerics.reproducible: its price");
   engine->add_option("--json", options.json, "file for the results, - for standard output");
   breccia::bench::GravityBenchOptions gravity_options;
   CLI::App* gravity = app.add_subcommand("gravity", "time and error of self-gravity");

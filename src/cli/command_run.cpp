@@ -23,6 +23,7 @@ struct Options {
   std::string restart;
   std::string walltime;
   bool profile = false;
+  std::string timeline;
 };
 
 double parse_until(const std::string& text) {
@@ -59,6 +60,7 @@ void run(const Options& options, const mpi::Comm& comm) {
   run_options.threads = options.threads;
   run_options.device = device_named(options.device);
   run_options.profile = options.profile;
+  run_options.timeline = options.timeline;
   scene::LoadedScene loaded = load(options.scene, comm);
   run_options.resolved = std::move(loaded.keys);
   sim::run(loaded.scene, run_options, comm);
@@ -92,6 +94,11 @@ void add_run(CLI::App& app, Action& action) {
       ->check(CLI::PositiveNumber)
       ->option_text("N");
   command.add_flag("--profile", options->profile, "Print the time of each stage at the end");
+  command
+      .add_option("--timeline", options->timeline,
+                  "Write what each rank did when in the last 100 steps or more, for Perfetto, chrome://tracing or "
+                  "tools/plot-timeline")
+      ->type_name("FILE");
   command.callback([options, &action] { action = [options](const mpi::Comm& comm) { run(*options, comm); }; });
 }
 

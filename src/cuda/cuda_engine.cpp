@@ -179,6 +179,24 @@ void CudaEngine<P>::hold_gravity(std::span<const Vec3d> acceleration) {
 }
 
 template <class P>
+PredictArguments<typename P::Real> CudaEngine<P>::predict_arguments(double time) const {
+  return {.particles = particles_.view(),
+          .block_keys = grid_.block_keys_of_particles(),
+          .count = particles_.count(),
+          .cell = setup_.cell,
+          .time = time,
+          .period = {boundaries_.period_start(), boundaries_.period_length()}};
+}
+
+template <class P>
+std::unique_ptr<gravity::ResidentSolver> CudaEngine<P>::make_resident_solver(GravityMethod method,
+                                                                             const gravity::Parameters& parameters) {
+  if (!CudaGravity<Real>::has(method)) return nullptr;
+  return std::make_unique<CudaGravity<Real>>(
+      method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_);
+}
+
+template <class P>
 void CudaEngine<P>::kick_velocities(double time) {
   launch_kick(pass_arguments(0.0, 0.0), setup_.uniform_gravity, time, particles_.count(), stream_);
 }

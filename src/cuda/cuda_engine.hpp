@@ -6,6 +6,7 @@
 #include <memory>
 #include <vector>
 
+#include "cuda/cuda_gravity.hpp"
 #include "cuda/device_array.hpp"
 #include "cuda/device_grid.hpp"
 #include "cuda/device_particles.hpp"
@@ -18,7 +19,7 @@
 namespace breccia::cuda {
 
 template <class P>
-class CudaEngine final : public grid::Engine {
+class CudaEngine final : public grid::Engine, public gravity::ResidentParticles {
  public:
   using Real = typename P::Real;
 
@@ -40,6 +41,8 @@ class CudaEngine final : public grid::Engine {
   void gather_scatter(double step) override;
   void predict(double time, std::vector<Vec3d>& position, std::vector<double>& mass) const override;
   void hold_gravity(std::span<const Vec3d> acceleration) override;
+  [[nodiscard]] std::unique_ptr<gravity::ResidentSolver> make_resident_solver(
+      GravityMethod method, const gravity::Parameters& parameters) override;
   void kick_velocities(double time) override;
   [[nodiscard]] ParticleOutput observe() const override;
   [[nodiscard]] ParticleOutput inspect() const override;
@@ -58,6 +61,7 @@ class CudaEngine final : public grid::Engine {
 
   [[nodiscard]] PassArguments<Real> pass_arguments(double step, double half_step) const;
   [[nodiscard]] NodeArguments<Real> node_arguments(double kick) const;
+  [[nodiscard]] PredictArguments<Real> predict_arguments(double time) const;
   void launch_pass(const PassArguments<Real>& arguments);
   void settle();
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);

@@ -1,6 +1,7 @@
 // Memory on the device that frees itself.
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <span>
 #include <string>
@@ -86,6 +87,17 @@ class DeviceArray {
   T* data_ = nullptr;
   std::size_t size_ = 0;
 };
+
+/// Values from here and there in device memory. The host waits once.
+template <class T, std::size_t kCount>
+[[nodiscard]] std::array<T, kCount> read_back(const std::array<const T*, kCount>& from, cudaStream_t stream) {
+  std::array<T, kCount> values;
+  for (std::size_t k = 0; k < kCount; ++k) {
+    check(cudaMemcpyAsync(&values[k], from[k], sizeof(T), cudaMemcpyDeviceToHost, stream), "read back");
+  }
+  check(cudaStreamSynchronize(stream), "read back");
+  return values;
+}
 
 /// Memory of the host that the device copies to and from on its own.
 template <class T>

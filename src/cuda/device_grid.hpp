@@ -23,6 +23,8 @@ class DeviceGrid {
   /// Block of each particle, in storage order. Its node field is relative to it.
   void set_block_keys(std::span<const grid::BlockKey> keys, cudaStream_t stream);
   [[nodiscard]] std::vector<grid::BlockKey> block_keys_of_particles(cudaStream_t stream) const;
+  /// The same, in device memory.
+  [[nodiscard]] const grid::BlockKey* block_keys_of_particles() const { return key_of_particle_.data(); }
 
   /// Sorts particles and builds tiles and blocks anew. The host waits for counts. Throws NumericsError if a particle is
   /// too far from the origin.

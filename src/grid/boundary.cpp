@@ -47,28 +47,23 @@ BoundarySet::BoundarySet(std::span<const BoundaryPlane> planes, double cell) : c
   }
 }
 
-void BoundarySet::find_nodes(std::span<const BlockKey> blocks) {
-  nodes_.clear();
-  if (walls_.empty()) return;
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const BlockCoord block = block_coord(blocks[b]);
-    for (int n = 0; n < kBlockNodes; ++n) {
-      const int i = kBlockWidth * block.x + n / 16;
-      const int j = kBlockWidth * block.y + n / 4 % 4;
-      const int k = kBlockWidth * block.z + n % 4;
-      const Vec3d x = cell_ * Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
-      for (std::size_t w = 0; w < walls_.size(); ++w) {
-        if (!holds_node(walls_[w], x, cell_)) continue;
-        nodes_.push_back(
-            {static_cast<std::uint32_t>(b * kBlockNodes + static_cast<std::size_t>(n)), static_cast<std::uint32_t>(w)});
-      }
+void BoundarySet::find_nodes(std::uint32_t index, BlockKey key, std::vector<WallNode>& nodes) const {
+  const BlockCoord block = block_coord(key);
+  for (std::uint32_t n = 0; n < kBlockNodes; ++n) {
+    const auto node = static_cast<int>(n);
+    const int i = kBlockWidth * block.x + node / 16;
+    const int j = kBlockWidth * block.y + node / 4 % 4;
+    const int k = kBlockWidth * block.z + node % 4;
+    const Vec3d x = cell_ * Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
+    for (std::uint32_t w = 0; w < walls_.size(); ++w) {
+      if (holds_node(walls_[w], x, cell_)) nodes.push_back({index * kBlockNodes + n, w});
     }
   }
 }
 
 template <class Real>
-void BoundarySet::apply(Real* velocities) const {
-  for (const WallNode& at : nodes_) {
+void BoundarySet::apply(std::span<const WallNode> nodes, Real* velocities) const {
+  for (const WallNode& at : nodes) {
     Real* v = velocities + std::size_t{at.node} * kChannels + kNewVelocity;
     const Vec3d allowed = constrained(walls_[at.wall], {v[0], v[1], v[2]});
     v[0] = static_cast<Real>(allowed.x);
@@ -77,14 +72,14 @@ void BoundarySet::apply(Real* velocities) const {
   }
 }
 
-template void BoundarySet::apply<float>(float*) const;
-template void BoundarySet::apply<double>(double*) const;
+template void BoundarySet::apply(std::span<const WallNode>, float*) const;
+template void BoundarySet::apply(std::span<const WallNode>, double*) const;
 
 Vec3d BoundarySet::into_period(Vec3d x) const {
+  const Vec3d lengths = period_length();
   for (int axis = 0; axis < 3; ++axis) {
-    const std::int32_t blocks = periodicity_.blocks[static_cast<std::size_t>(axis)];
-    if (blocks == 0) continue;
-    const double length = blocks * kBlockWidth * cell_;
+    const double length = component(std::as_const(lengths), axis);
+    if (length == 0.0) continue;
     const double start = component(std::as_const(period_start_), axis);
     double& value = component(x, axis);
     value -= length * std::floor((value - start) / length);

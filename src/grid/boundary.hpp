@@ -19,23 +19,46 @@ class BoundarySet {
   /// True if there are planes other than periodic ones.
   [[nodiscard]] bool has_walls() const { return !walls_.empty(); }
   [[nodiscard]] std::span<const BoundaryPlane> walls() const { return walls_; }
-  /// Finds the nodes of these blocks that lie in or behind a wall.
-  void find_nodes(std::span<const BlockKey> blocks);
+  /// Finds the nodes of these blocks that lie in or behind a wall. `shared(b)`: whether block b is updated before the
+  /// rest.
+  template <class Shared>
+  void find_nodes(std::span<const BlockKey> blocks, Shared&& shared) {
+    shared_nodes_.clear();
+    rest_.clear();
+    for (std::uint32_t b = 0; !walls_.empty() && b < blocks.size(); ++b) {
+      find_nodes(b, blocks[b], shared(b) ? shared_nodes_ : rest_);
+    }
+  }
   /// Applies the walls to v^{n+1/2} of the found nodes. `velocities` as in tile.hpp.
   template <class Real>
-  void apply(Real* velocities) const;
+  void apply_to_shared(Real* velocities) const {
+    apply(shared_nodes_, velocities);
+  }
+  template <class Real>
+  void apply_to_rest(Real* velocities) const {
+    apply(rest_, velocities);
+  }
   /// The position moved into the period of the periodic axes.
   [[nodiscard]] Vec3d into_period(Vec3d x) const;
+  /// Where the period of each axis starts, and its length; 0: it does not repeat [m].
+  [[nodiscard]] Vec3d period_start() const { return period_start_; }
+  [[nodiscard]] Vec3d period_length() const {
+    const auto length = [&](std::size_t axis) { return periodicity_.blocks[axis] * kBlockWidth * cell_; };
+    return {length(0), length(1), length(2)};
+  }
 
  private:
   struct WallNode {
     std::uint32_t node;
     std::uint32_t wall;
   };
+  void find_nodes(std::uint32_t index, BlockKey key, std::vector<WallNode>& nodes) const;
+  template <class Real>
+  void apply(std::span<const WallNode> nodes, Real* velocities) const;
 
   double cell_;
   std::vector<BoundaryPlane> walls_;
-  std::vector<WallNode> nodes_;
+  std::vector<WallNode> shared_nodes_, rest_;
   Periodicity periodicity_;
   Vec3d period_start_{};
 };

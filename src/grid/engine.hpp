@@ -11,6 +11,7 @@
 #include "breccia/engine_state.hpp"
 #include "breccia/particle_arrays.hpp"
 #include "breccia/scene.hpp"
+#include "breccia/timeline.hpp"
 #include "material/effects_policy.hpp"
 #include "material/flaws.hpp"
 #include "mpi/comm.hpp"
@@ -80,6 +81,9 @@ struct EngineStats {
   std::uint64_t packs = 0;  ///< SIMD packs in tiles; 0 on a device
   std::uint64_t blocks = 0;
   std::uint64_t halo_bytes_per_step = 0;
+  std::uint64_t key_exchanges = 0;  ///< sortings after which ranks had to agree on shared blocks anew
+  double halo_in_flight = 0.0;      ///< from sending to having received, all messages of nodes so far [s]
+  double halo_waited = 0.0;         ///< of that, with nothing else to do [s]
   std::uint64_t particle_bytes = 0;
   std::uint64_t grid_bytes = 0;
 };
@@ -155,6 +159,8 @@ class Engine {
   /// May wait for a device: not meant for every step.
   [[nodiscard]] virtual PassReport passes() const = 0;
   [[nodiscard]] virtual EngineStats stats() const = 0;
+  /// Has tiles and messages noted in `timeline` from now on; null: no more. An engine may have nothing to note.
+  virtual void record(Timeline* timeline) { static_cast<void>(timeline); }
 };
 
 /// The engine on host cores.

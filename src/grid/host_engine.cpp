@@ -40,6 +40,7 @@ template <class P>
 PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
   PassArguments<P> a;
   a.tiles = tiles_.data();
+  a.targets = ordered_.targets().empty() ? tiles_.data() : ordered_.targets().data();
   a.tile_count = static_cast<std::uint32_t>(tiles_.size());
   a.boxes = boxes_.data();
   a.kinematics = store_.kinematics.data();
@@ -110,15 +111,21 @@ void HostEngine<P>::update_grid(double kick) {
   }
   trailing_kick_ = 0.0;
   kick_ = kick;
-  halo_.add_to_owners(sums_.data(), comm_);
-  for (const std::uint32_t block : shared_blocks_) rows_[block] = kAllRows;
   const NodeArguments<P> a = node_arguments(kick);
+  finish_sums(a);
   const auto blocks = static_cast<std::uint32_t>(owned_blocks_);
   constexpr std::uint32_t kChunk = 64;
-#pragma omp parallel for schedule(static) num_threads(setup_.threads)
-  for (std::uint32_t b = 0; b < blocks; b += kChunk) kernels_.update_blocks(a, b, std::min(b + kChunk, blocks));
-  boundaries_.apply(velocities_.data());
-  halo_.share_from_owners(velocities_.data(), comm_);
+#pragma omp parallel num_threads(setup_.threads)
+  {
+#pragma omp for schedule(static)
+    for (std::size_t n = ordered_.shared_sums(); n < ordered_.sums(); ++n) {
+      ordered_.add_up(n, sums_.data(), rows_.data());
+    }
+#pragma omp for schedule(static)
+    for (std::uint32_t b = 0; b < blocks; b += kChunk) kernels_.update_blocks(a, b, std::min(b + kChunk, blocks));
+  }
+  boundaries_.apply_to_rest(velocities_.data());
+  finish_velocities();
 }
 
 template <class P>

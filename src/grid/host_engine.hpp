@@ -5,9 +5,12 @@
 #include "grid/blocks.hpp"
 #include "grid/boundary.hpp"
 #include "grid/engine.hpp"
+#include "grid/ordered_sums.hpp"
+#include "grid/sweep_plan.hpp"
 #include "grid/tile.hpp"
 #include "mpi/halo.hpp"
 #include "mpi/slabs.hpp"
+#include "mpi/standing_requests.hpp"
 
 namespace breccia::grid {
 
@@ -23,15 +26,12 @@ struct SortedPlacements {
   std::vector<Placement> lone;
 };
 
-/// A step of a sweep: pass over the tiles first .. last-1, or update the grid in their blocks.
-struct SweepStep {
-  std::uint32_t first, last;
-  bool update;
+/// Nodes of a block that a rank asks the owner for: bit n for the plane n across the slabs.
+struct BlockRequest {
+  BlockKey key;
+  std::uint32_t planes;
+  friend bool operator==(const BlockRequest&, const BlockRequest&) = default;
 };
-/// Steps that one thread does in this order.
-using SweepTask = std::vector<SweepStep>;
-/// Tasks that may run at once.
-using SweepPhase = std::vector<SweepTask>;
 
 template <class P>
 class HostEngine final : public Engine {
@@ -66,6 +66,7 @@ class HostEngine final : public Engine {
   bool finish_damage() override;
   [[nodiscard]] PassReport passes() const override { return report_; }
   [[nodiscard]] EngineStats stats() const override;
+  void record(Timeline* timeline) override { timeline_ = timeline; }
 
  private:
   static constexpr std::size_t kLanes = P::kLanes;
@@ -77,7 +78,26 @@ class HostEngine final : public Engine {
   void run_pass(const PassArguments<P>& arguments, const NodeArguments<P>* trailing = nullptr);
   void report_fault();
   void run_task(const SweepTask& task, const PassArguments<P>& arguments, const NodeArguments<P>* trailing,
-                std::vector<TileReport>& reports) const;
+                std::vector<TileReport>& reports);
+
+  // Exchange with other ranks (host_engine_halo.cpp).
+  [[nodiscard]] bool has_neighbours() const { return !sum_exchange_.empty() || !velocity_exchange_.empty(); }
+  void send_sums();                                       // once the boundary tiles have scattered
+  void progress(const NodeArguments<P>* arguments);       // of messages; null: the kick is not known yet
+  void update_shared(const NodeArguments<P>& arguments);  // with the sums that have arrived; sends velocities
+  void finish_sums(const NodeArguments<P>& arguments);
+  void finish_velocities();
+  void wait_for_velocities();
+  // Calls work(); its time is a bar of the timeline.
+  template <class F>
+  void noted(const char* name, F&& work) {
+    const auto begin = Timeline::Clock::now();
+    work();
+    note(name, Timeline::Lane::kTiles, begin, Timeline::Clock::now());
+  }
+  void note(const char* name, Timeline::Lane lane, Timeline::Clock::time_point begin, Timeline::Clock::time_point end) {
+    if (timeline_ != nullptr) timeline_->add(name, lane, begin, end);
+  }
 
   // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
   void settle(std::vector<Placement> placements);
@@ -88,8 +108,11 @@ class HostEngine final : public Engine {
   [[nodiscard]] bool lone_strayed() const;  // more than a node since the last sorting
   void arrange(const SortedPlacements& placements);
   void connect_tiles();
+  [[nodiscard]] std::vector<std::vector<BlockRequest>> reach_blocks();
+  void make_room();  // for the nodes of all blocks
   void connect_halo();
-  void plan_sweep();
+  [[nodiscard]] std::vector<mpi::SharedNodes> nodes_of(const std::vector<std::vector<BlockRequest>>& requests) const;
+  void sort_cells_by_id(std::span<std::uint32_t> source, std::span<const std::uint32_t> cell_ends) const;
   void compact_flaws();
   void switch_damage_off();
 
@@ -137,7 +160,7 @@ class HostEngine final : public Engine {
   std::vector<float> flaw_thresholds_;
   std::vector<Tile> tiles_;
   std::vector<TileBox> boxes_;
-  std::vector<SweepPhase> sweep_;
+  Sweep sweep_;
   LonePacks lone_;
   std::vector<BlockCoord> lone_block_;
   std::vector<std::int32_t> lone_node_;  // packed node at the last sorting
@@ -147,15 +170,20 @@ class HostEngine final : public Engine {
   LargeArray<Real> sums_;
   LargeArray<Real> velocities_;
   std::vector<RowMask> rows_;
-  std::vector<std::uint32_t> shared_blocks_;  // owned blocks that other ranks add to
-  std::vector<char> is_shared_;               // the same, by block
-  double trailing_kick_ = 0.0;                // of the rows already updated by the last pass; 0: none
+  std::vector<BlockSums> block_sums_;  // by owned block
+  std::vector<char> is_boundary_;      // by tile: it reaches shared blocks or those of other ranks
+  double trailing_kick_ = 0.0;         // of the rows already updated by the last pass; 0: none
   std::size_t owned_blocks_ = 0;
   double smallest_mass_ = 0.0;
   std::uint64_t strayed_packs_ = 0;  // seen since the last sorting; reported there, on all ranks at once
 
   mpi::Slabs slabs_;
-  mpi::Halo<Real, kChannels> halo_;
+  mpi::StandingRequests<BlockRequest> block_requests_;
+  OrderedSums ordered_;  // of a reproducible run
+  mpi::NodeExchange<Real, kChannels> sum_exchange_{1};
+  mpi::NodeExchange<Real, kChannels> velocity_exchange_{2};
+  bool shared_updated_ = false;   // since the sums were sent
+  Timeline* timeline_ = nullptr;  // of the run; null: none wanted
   PassReport report_;
   std::uint64_t gathers_ = 0;  // since the last sorting
   PassFault fault_;            // of the last pass

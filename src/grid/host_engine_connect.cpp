@@ -1,4 +1,4 @@
-// After sorting: which blocks a tile reaches, which nodes are shared with other ranks, which tiles may run at once.
+// After sorting: which blocks a tile reaches, which nodes are shared with other ranks, which tiles are of the boundary.
 #include <algorithm>
 
 #include "grid/host_engine.hpp"
@@ -40,97 +40,126 @@ void for_each_reached(const ParticleStore<P>& store, const Tile& tile, BlockCoor
 }  // namespace
 
 template <class P>
-void HostEngine<P>::connect_tiles() {
-  // Owned blocks first, so that the grid update runs over a contiguous range; blocks of other ranks behind them.
-  std::vector<BlockKey> foreign;
+std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
+  // Which planes of a foreign block a tile in direction d of it, across the slabs, can reach: only those travel.
+  const auto planes = [](int d) { return d < 0 ? 0b1100U : d > 0 ? 0b0011U : 0b1111U; };
+  const int axis = slabs_.axis();
+  const int stride = axis == 0 ? 9 : axis == 1 ? 3 : 1;
+  std::vector<BlockRequest> foreign;
   const std::size_t tiles = tiles_.size();
   for (std::size_t t = 0; t < tiles; ++t) {
-    for_each_reached(store_, tiles_[t], block_coord(blocks_.keys()[t]), periodicity_, [&](int, BlockCoord b) {
+    for_each_reached(store_, tiles_[t], block_coord(blocks_.keys()[t]), periodicity_, [&](int n, BlockCoord b) {
       if (owner(b) == comm_.rank()) {
         blocks_.insert(block_key(b));
       } else {
-        foreign.push_back(block_key(b));
+        foreign.push_back({block_key(b), planes(n / stride % 3 - 1)});
       }
     });
   }
-  std::sort(foreign.begin(), foreign.end());
-  foreign.erase(std::unique(foreign.begin(), foreign.end()), foreign.end());
+  std::sort(foreign.begin(), foreign.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
+  std::vector<std::vector<BlockRequest>> of_rank(static_cast<std::size_t>(comm_.size()));
+  for (const BlockRequest& request : foreign) {
+    auto& requests = of_rank[static_cast<std::size_t>(owner(block_coord(request.key)))];
+    if (requests.empty() || requests.back().key != request.key) {
+      requests.push_back(request);
+    } else {
+      requests.back().planes |= request.planes;
+    }
+  }
+  return of_rank;
+}
 
-  // Blocks that only other ranks touch must exist here before the foreign ones follow.
-  std::vector<std::vector<BlockKey>> wanted(static_cast<std::size_t>(comm_.size()));
-  for (const BlockKey key : foreign) wanted[static_cast<std::size_t>(owner(block_coord(key)))].push_back(key);
-  for (const auto& keys : comm_.alltoall(wanted)) {
-    for (const BlockKey key : keys) blocks_.insert(key);
+template <class P>
+void HostEngine<P>::connect_tiles() {
+  // Owned blocks first, so that the grid update runs over a contiguous range; blocks of other ranks behind them.
+  block_requests_.ask(reach_blocks(), comm_);
+  // Blocks that only other ranks touch must exist here, too.
+  for (const auto& requests : block_requests_.by_rank()) {
+    for (const BlockRequest& request : requests) blocks_.insert(request.key);
   }
   owned_blocks_ = blocks_.size();
-  for (const BlockKey key : foreign) blocks_.insert(key);
-  for (std::size_t t = 0; t < tiles; ++t) {
+  for (const auto& requests : block_requests_.of_rank()) {
+    for (const BlockRequest& request : requests) blocks_.insert(request.key);
+  }
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::fill(std::begin(tiles_[t].neighbours), std::end(tiles_[t].neighbours), kNoBlock);
     for_each_reached(store_, tiles_[t], block_coord(blocks_.keys()[t]), periodicity_,
                      [&](int n, BlockCoord b) { tiles_[t].neighbours[n] = blocks_.find(block_key(b)); });
   }
+  connect_halo();
+  make_room();
+  sweep_ =
+      plan_sweep(std::span(blocks_.keys()).first(tiles_.size()), is_boundary_, periodicity_.blocks[0], setup_.threads);
+  boundaries_.find_nodes(std::span(blocks_.keys()).first(owned_blocks_),
+                         [&](std::uint32_t b) { return block_sums_[b] == BlockSums::kShared; });
+}
+
+template <class P>
+void HostEngine<P>::make_room() {
   // The grid update has cleared every sum. Old velocities stay where they are: only nodes that a scatter has reached
   // since are read.
-  const std::size_t nodes = blocks_.size() * kBlockNodes * kChannels;
-  if (nodes > sums_.capacity()) {
+  const std::size_t blocks = std::max(blocks_.size(), ordered_.blocks());
+  const auto grow = [](LargeArray<Real>& array, std::size_t of_blocks) {
+    const std::size_t nodes = of_blocks * kBlockNodes * kChannels;
     // Some room for the next sortings, not twice as much as push_back would take.
-    sums_.reserve(nodes + nodes / 16);
-    velocities_.reserve(nodes + nodes / 16);
-  }
-  sums_.resize(nodes, Real(0));
-  velocities_.resize(nodes, Real(0));
-  rows_.assign(blocks_.size(), RowMask{});
-  boundaries_.find_nodes(std::span(blocks_.keys()).first(owned_blocks_));
+    if (nodes > array.capacity()) array.reserve(nodes + nodes / 16);
+    array.resize(nodes, Real(0));
+  };
+  grow(sums_, blocks);
+  grow(velocities_, blocks_.size());
+  rows_.assign(blocks, RowMask{});
 }
 
 template <class P>
 void HostEngine<P>::connect_halo() {
-  // Which planes of a foreign block are touched: only those travel.
-  struct Request {
-    BlockKey key;
-    std::uint32_t planes;
-  };
-  const int axis = slabs_.axis();
-  const int step = axis == 0 ? 9 : axis == 1 ? 3 : 1;
-  std::vector<std::uint32_t> planes(blocks_.size() - owned_blocks_, 0U);
-  for (const Tile& tile : tiles_) {
-    for (int n = 0; n < 27; ++n) {
-      const std::uint32_t b = tile.neighbours[n];
-      if (b == kNoBlock || b < owned_blocks_) continue;
-      const int direction = n / step % 3 - 1;
-      planes[b - owned_blocks_] |= direction < 0 ? 0b1100U : direction > 0 ? 0b0011U : 0b1111U;
+  block_sums_.assign(owned_blocks_, BlockSums::kInPlace);
+  is_boundary_.assign(tiles_.size(), 0);
+  if (comm_.size() == 1) return;
+  for (const auto& requests : block_requests_.by_rank()) {
+    for (const BlockRequest& request : requests) block_sums_[blocks_.find(request.key)] = BlockSums::kShared;
+  }
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    for (const std::uint32_t b : tiles_[t].neighbours) {
+      if (b != kNoBlock && (b >= owned_blocks_ || block_sums_[b] == BlockSums::kShared)) is_boundary_[t] = 1;
     }
   }
-  std::vector<std::vector<Request>> requests(static_cast<std::size_t>(comm_.size()));
-  for (std::size_t i = 0; i < planes.size(); ++i) {
-    const BlockKey key = blocks_.keys()[owned_blocks_ + i];
-    requests[static_cast<std::size_t>(owner(block_coord(key)))].push_back({key, planes[i]});
-  }
-  const auto nodes_of = [&](const std::vector<std::vector<Request>>& all) {
-    std::vector<mpi::SharedNodes> peers;
-    for (std::size_t rank = 0; rank < all.size(); ++rank) {
-      if (all[rank].empty()) continue;
-      mpi::SharedNodes peer{static_cast<int>(rank), {}};
-      for (const Request& request : all[rank]) {
-        const std::uint32_t block = blocks_.find(request.key);
-        for (std::uint32_t n = 0; n < kBlockNodes; ++n) {
-          const std::uint32_t plane = axis == 0 ? n / 16 : axis == 1 ? n / 4 % 4 : n % 4;
-          if ((request.planes >> plane & 1U) != 0) peer.nodes.push_back(block * kBlockNodes + n);
+  auto touched = nodes_of(block_requests_.of_rank());
+  auto owned = nodes_of(block_requests_.by_rank());
+  if (setup_.numerics.reproducible) {
+    // What boundary tiles reach gets its sums in another order than on one rank.
+    for (std::size_t t = 0; t < tiles_.size(); ++t) {
+      for (const std::uint32_t b : tiles_[t].neighbours) {
+        if (is_boundary_[t] != 0 && b < owned_blocks_ && block_sums_[b] == BlockSums::kInPlace) {
+          block_sums_[b] = BlockSums::kCollected;
         }
       }
-      peers.push_back(std::move(peer));
     }
-    return peers;
-  };
-  auto touched = nodes_of(requests);
-  const auto asked = comm_.alltoall(requests);
-  shared_blocks_.clear();
-  for (const std::vector<Request>& of_rank : asked) {
-    for (const Request& request : of_rank) shared_blocks_.push_back(blocks_.find(request.key));
+    ContributionMessages messages = ordered_.connect(
+        tiles_, blocks_, block_sums_, periodicity_.blocks[0], [&](BlockCoord b) { return owner(b); }, comm_);
+    sum_exchange_.set(std::move(messages.sent), std::move(messages.received), comm_);
+  } else {
+    sum_exchange_.set(touched, owned, comm_);
   }
-  is_shared_.assign(blocks_.size(), 0);
-  for (const std::uint32_t block : shared_blocks_) is_shared_[block] = 1;
-  halo_.set(std::move(touched), nodes_of(asked));
+  velocity_exchange_.set(std::move(owned), std::move(touched), comm_);
+}
+
+template <class P>
+std::vector<mpi::SharedNodes> HostEngine<P>::nodes_of(const std::vector<std::vector<BlockRequest>>& requests) const {
+  const int axis = slabs_.axis();
+  std::vector<mpi::SharedNodes> peers;
+  for (std::size_t rank = 0; rank < requests.size(); ++rank) {
+    if (requests[rank].empty()) continue;
+    mpi::SharedNodes peer{static_cast<int>(rank), {}};
+    for (const BlockRequest& request : requests[rank]) {
+      const std::uint32_t block = blocks_.find(request.key);
+      for (std::uint32_t n = 0; n < kBlockNodes; ++n) {
+        const std::uint32_t plane = axis == 0 ? n / 16 : axis == 1 ? n / 4 % 4 : n % 4;
+        if ((request.planes >> plane & 1U) != 0) peer.nodes.push_back(block * kBlockNodes + n);
+      }
+    }
+    peers.push_back(std::move(peer));
+  }
+  return peers;
 }
 
 template class HostEngine<MixedPrecision>;

@@ -160,7 +160,12 @@ EngineStats HostEngine<P>::stats() const {
   stats.tiles = tiles_.size();
   stats.packs = lone_.first_pack;
   stats.blocks = owned_blocks_;
-  stats.halo_bytes_per_step = halo_.bytes_per_step();
+  stats.halo_bytes_per_step = sum_exchange_.bytes() + velocity_exchange_.bytes();
+  stats.key_exchanges = block_requests_.exchanges();
+  for (const mpi::Flights& f : {sum_exchange_.flights(), velocity_exchange_.flights()}) {
+    stats.halo_in_flight += f.in_flight.count();
+    stats.halo_waited += f.waited.count();
+  }
   for (int g = 0; g < kGroupCount; ++g) {
     if (store_.has(static_cast<Group>(g))) {
       stats.particle_bytes += store_.packs() * ParticleStore<P>::stride(static_cast<Group>(g));

@@ -65,8 +65,6 @@ void HostEngine<P>::settle(std::vector<Placement> placements) {
   migrate(placements);
   arrange(separate(std::move(placements)));
   connect_tiles();
-  connect_halo();
-  plan_sweep();
   report_ = {};
   gathers_ = 0;
 }
@@ -159,6 +157,7 @@ void HostEngine<P>::arrange(const SortedPlacements& all) {
     source[slot] = placements[i].slot;
     node[slot] = tile_node(placements[i].node);
   }
+  if (setup_.numerics.reproducible) sort_cells_by_id(source, place);
   lone_block_.clear();
   lone_node_.clear();
   for (const Placement& p : all.lone) {
@@ -175,6 +174,20 @@ void HostEngine<P>::arrange(const SortedPlacements& all) {
   blocks_.clear();
   for (const std::uint32_t b : by_key) blocks_.insert(keys[b]);
   if (store_.has(Group::kFlaws)) compact_flaws();
+}
+
+template <class P>
+void HostEngine<P>::sort_cells_by_id(std::span<std::uint32_t> source, std::span<const std::uint32_t> cell_ends) const {
+  // Else the order would tell from which rank a particle came.
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    std::size_t first = tiles_[t].first_pack * kLanes;
+    for (std::size_t c = 0; c < kBlockNodes; ++c) {
+      const std::size_t last = cell_ends[t * kBlockNodes + c];
+      const auto cell = source.subspan(first, last - first);
+      if (cell.size() > 1) std::ranges::sort(cell, {}, [&](std::uint32_t slot) { return id(slot); });
+      first = last;
+    }
+  }
 }
 
 template <class P>

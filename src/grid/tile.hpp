@@ -95,6 +95,7 @@ struct PassArguments {
   using Real = typename P::Real;
 
   const Tile* tiles = nullptr;
+  const Tile* targets = nullptr;  ///< the same tiles, with the blocks they add to as neighbours
   std::uint32_t tile_count = 0;
   TileBox* boxes = nullptr;  ///< written by a scatter, read by the gather after it
   Kinematics<P>* kinematics = nullptr;

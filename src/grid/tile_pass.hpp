@@ -33,8 +33,8 @@ class TileGrid {
   BRECCIA_HD void store(std::uint32_t tile, TileReport& report) {
     if (!a_.scatter) return;
     a_.boxes[tile] = touched_.box();
-    mark_rows(a_.tiles[tile], a_.boxes[tile], a_.rows);
-    if (add_tile<P>(a_.tiles[tile], a_.boxes[tile], scratch_.sums, a_.sums, scratch_.beyond)) ++report.strayed;
+    mark_rows(a_.targets[tile], a_.boxes[tile], a_.rows);
+    if (add_tile<P>(a_.targets[tile], a_.boxes[tile], scratch_.sums, a_.sums, scratch_.beyond)) ++report.strayed;
     if (strayed_) {
       for (Real& sum : scratch_.sums) sum = Real(0);
       ++report.strayed;

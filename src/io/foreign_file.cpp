@@ -107,24 +107,30 @@ int status_of_child(const std::filesystem::path& path, const Reader& reader, uns
   return status;
 }
 
+void require_that_it_ends_well(const std::filesystem::path& path, const Reader& reader, unsigned seconds) {
+  const int status = status_of_child(path, reader, seconds);
+  if (status == 0) return;
+  const bool endless = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM;
+  throw IoError(fmt::format("{}: the file is damaged: reading it {}", path.string(),
+                            endless ? "does not come to an end" : "crashes HDF5"));
+}
+
 }  // namespace
 
-void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm) {
+void require_harmless(const std::filesystem::path& path) {
   std::error_code unknown;
   const std::uintmax_t bytes = std::filesystem::file_size(path, unknown);
-  const std::uintmax_t seconds = unknown ? 0 : bytes / kBytesPerSecond;
-  require_harmless(path, comm, read_everything, kLeastSeconds + static_cast<unsigned>(seconds));
+  if (unknown) return;  // nothing there to read
+  require_that_it_ends_well(path, read_everything, kLeastSeconds + static_cast<unsigned>(bytes / kBytesPerSecond));
+}
+
+void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm) {
+  on_root(comm, [&] { require_harmless(path); });
 }
 
 void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm, const Reader& reader,
                       unsigned seconds) {
-  on_root(comm, [&] {
-    const int status = status_of_child(path, reader, seconds);
-    if (status == 0) return;
-    const bool endless = WIFSIGNALED(status) && WTERMSIG(status) == SIGALRM;
-    throw IoError(fmt::format("{}: the file is damaged: reading it {}", path.string(),
-                              endless ? "does not come to an end" : "crashes HDF5"));
-  });
+  on_root(comm, [&] { require_that_it_ends_well(path, reader, seconds); });
 }
 
 }  // namespace breccia::io

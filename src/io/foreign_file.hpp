@@ -8,8 +8,11 @@
 
 namespace breccia::io {
 
-/// Reads all of the HDF5 file `path` in a child process of the root first. Throws IoError if that crashes or does not
-/// come to an end; the same on all ranks. What is merely not as expected is left to the reader. Collective.
+/// Reads all of the HDF5 file `path` in a child process first. Throws IoError if that crashes or does not come to an end.
+/// What is merely not as expected is left to the reader. Needs no MPI.
+void require_harmless(const std::filesystem::path& path);
+
+/// The same by a child of the root, with the same outcome on all ranks. Collective.
 void require_harmless(const std::filesystem::path& path, const mpi::Comm& comm);
 
 /// The same with another reader in the child, which gets `seconds` for it.

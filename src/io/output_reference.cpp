@@ -53,7 +53,8 @@ Written at the end: `particles`, `steps`, `simulated_time` [s], `time_step` (the
 `particle_steps_per_second`; `conservation` with the drifts of `mass` (over the total mass), `momentum` (over sum m |v|),
 `angular_momentum` (over sum m |x cross v|) and `energy` (over max(kinetic + |potential|)); `damaged_fraction`; `clamped_volumes`; `remnants`,
 largest first; `stages` with the wall time of each stage of the step on the first rank, parts of gravity as `gravity: part` and also
-in `gravity`; `gravity` with `evaluations` of each method, `reason` and `boxes` of the last one, `pairs`,
+in `gravity`; `halo` with `in_flight_seconds`, `waited_seconds` and `bytes_per_step` of all ranks, `hidden_fraction` and `key_exchanges` (null on
+one rank; overlap.md); `gravity` with `evaluations` of each method, `reason` and `boxes` of the last one, `pairs`,
 `cell_interactions`, `expansions`, `bytes_sent` of all ranks and `net_force`, the largest over sum m |a|; `slabs` with the
 `axis` they cut across, `imbalance_mean`, `imbalance_max` and `imbalance` (in the last of `windows`), the largest over the mean
 counted work of the ranks, `recuts` of slabs, and `halo_bytes_mean` and `halo_bytes_max` that a rank sends in a step at the end;

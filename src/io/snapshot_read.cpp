@@ -114,7 +114,7 @@ void fill_missing(ParticleOutput& particles, h5::Rows rows) {
 
 std::string scene_name_in(const std::filesystem::path& path) {
   const mpi::Comm self(MPI_COMM_SELF);
-  require_harmless(path, self);
+  require_harmless(path);
   return read_header(h5::File::open(path, self)).scene_name;
 }
 

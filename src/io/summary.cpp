@@ -32,6 +32,15 @@ Json stages_json(const std::vector<StageTiming>& stages) {
   return list;
 }
 
+Json halo_json(const std::optional<HaloTiming>& halo) {
+  if (!halo) return nullptr;
+  return {{"in_flight_seconds", halo->in_flight_seconds},
+          {"waited_seconds", halo->waited_seconds},
+          {"hidden_fraction", halo->hidden_fraction},
+          {"bytes_per_step", halo->bytes_per_step},
+          {"key_exchanges", halo->key_exchanges}};
+}
+
 Json scene_json(const std::vector<ResolvedKey>& keys) {
   Json scene = Json::object();
   for (const ResolvedKey& key : keys) scene[key.key] = key.value;
@@ -78,6 +87,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary) {
   json["clamped_volumes"] = summary.clamped_volumes;
   json["remnants"] = summary.remnants;
   json["stages"] = stages_json(summary.stages);
+  json["halo"] = halo_json(summary.halo);
   json["gravity"] = summary.gravity;
   json["slabs"] = summary.slabs;
   json["versions"] = versions_json();

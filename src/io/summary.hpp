@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -28,6 +29,15 @@ struct StageTiming {
   std::uint64_t calls = 0;
 };
 
+/// Messages of nodes between ranks; times are sums over the ranks.
+struct HaloTiming {
+  double in_flight_seconds = 0.0;    ///< from sending until everything expected was there
+  double waited_seconds = 0.0;       ///< of that, with nothing else to do
+  double hidden_fraction = 1.0;      ///< 1 - waited / in flight
+  std::uint64_t bytes_per_step = 0;  ///< sent by all ranks, as the last sorting left it
+  std::uint64_t key_exchanges = 0;   ///< sortings after which the ranks had to agree on shared blocks anew
+};
+
 struct RunSummary {
   std::uint64_t particles = 0;
   std::uint64_t steps = 0;
@@ -43,6 +53,7 @@ struct RunSummary {
   std::uint64_t clamped_volumes = 0;                  ///< volume changes that were cut (hard case 3)
   nlohmann::json remnants = nlohmann::json::array();  ///< largest first (remnants_json.hpp)
   std::vector<StageTiming> stages;
+  std::optional<HaloTiming> halo;        ///< none on one rank
   nlohmann::json gravity;                ///< what its evaluations came to; null without self-gravity
   nlohmann::json slabs;                  ///< axis, balance of the ranks' work, bytes of the halo at the end
   std::vector<ResolvedKey> scene;        ///< every key as resolved

@@ -107,6 +107,14 @@ BRECCIA_HD T reduce_tension(T kirchhoff_pressure, T damage) {
   return select(kirchhoff_pressure < T(R(0)), kirchhoff_pressure - damage * kirchhoff_pressure, kirchhoff_pressure);
 }
 
+/// What of J q is left of it in reduce_tension(P + q) - reduce_tension(P): damage takes its share of what only relieves
+/// tension.
+template <class T>
+BRECCIA_HD T reduced_viscous(const TrialPressure<T>& trial, T damage) {
+  using R = scalar_of<T>;
+  return trial.viscous - damage * min(trial.viscous, max(-trial.thermodynamic, T(R(0))));
+}
+
 }  // namespace detail
 
 /// Steps 1 and 2 of physics.md 4 and step 1 of 5, at time n. Reads the trial elastic strain, J, e and D; stores the
@@ -122,7 +130,7 @@ BRECCIA_HD Sym3<T> update_stress(Fx fx, const Constants<R>& k, State<T>& state, 
   const detail::TrialPressure<T> trial = detail::trial_pressure(fx, k, state, energy, damage, velocity_gradient);
   T pressure = detail::reduce_tension(trial.thermodynamic + trial.viscous, damage);
   dissipation.plastic = zero;
-  dissipation.viscous = T(R(-2)) * half_step * trial.viscous * trace(velocity_gradient);
+  T viscous = detail::reduced_viscous(trial, damage);
 
   Dev3<T> s{zero, zero, zero, zero, zero};
   if (fx.shear) {
@@ -140,6 +148,7 @@ BRECCIA_HD Sym3<T> update_stress(Fx fx, const Constants<R>& k, State<T>& state, 
         const T ratio = min(max(yield, zero) / max(hencky_norm, T(R(1.0e-30))), one);
         const T apex = apex_pressure(k.strength, damage, melt) + outside;
         pressure = select(beyond_apex, apex, pressure);
+        viscous = select(beyond_apex, outside, viscous);
         const T shrink = select(beyond_apex, zero, ratio);
         state.elastic = traceless_power(state.elastic, powers, shrink);
         s = shrink * s;
@@ -147,6 +156,7 @@ BRECCIA_HD Sym3<T> update_stress(Fx fx, const Constants<R>& k, State<T>& state, 
       }
     }
   }
+  dissipation.viscous = T(R(-2)) * half_step * viscous * trace(velocity_gradient);
   state.kirchhoff_pressure = pressure;
   if (fx.energy)
     state.energy.add((half_step * k.inverse_density) * detail::stress_power(s, pressure, velocity_gradient));

@@ -22,7 +22,7 @@ struct State {
 template <class T>
 struct Dissipation {
   T plastic;  ///< tau : d_plastic dt of the return mapping
-  T viscous;  ///< -J q tr(d) dt
+  T viscous;  ///< -J q tr(d) dt, of J q what the stress has in it after damage and apex
 };
 
 }  // namespace breccia::material

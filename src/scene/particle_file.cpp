@@ -8,6 +8,7 @@
 #include <cmath>
 
 #include "breccia/error.hpp"
+#include "io/foreign_file.hpp"
 
 namespace breccia::scene {
 
@@ -133,6 +134,7 @@ ParticleFileSlice read_slice(const ParticleFile& file, std::uint64_t begin, std:
 }  // namespace
 
 ParticleFileSummary summarize_particle_file(const std::string& path) {
+  io::require_harmless(path);
   const QuietHdf5 quiet;
   const ParticleFile file(path);
   ParticleFileSummary summary;

@@ -21,6 +21,7 @@
 #include "sim/progress.hpp"
 #include "sim/stop_requests.hpp"
 #include "sim/time_loop.hpp"
+#include "sim/timeline_file.hpp"
 
 namespace breccia::sim {
 namespace {
@@ -176,6 +177,25 @@ class Output {
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };
 
+std::optional<io::HaloTiming> halo_timing(const grid::Engine& engine, const mpi::Comm& comm) {
+  if (comm.size() == 1) return std::nullopt;
+  const grid::EngineStats stats = engine.stats();
+  io::HaloTiming halo;
+  halo.in_flight_seconds = comm.sum(stats.halo_in_flight);
+  halo.waited_seconds = comm.sum(stats.halo_waited);
+  if (halo.in_flight_seconds > 0.0) halo.hidden_fraction = 1.0 - halo.waited_seconds / halo.in_flight_seconds;
+  halo.bytes_per_step = comm.sum(stats.halo_bytes_per_step);
+  halo.key_exchanges = comm.max(stats.key_exchanges);
+  return halo;
+}
+
+void print_halo(const io::HaloTiming& halo) {
+  fmt::print("messages of nodes: {:.1f} % of their {:.3g} s under way hidden behind other work, {:.3g} s waited\n",
+             100.0 * halo.hidden_fraction, halo.in_flight_seconds, halo.waited_seconds);
+  fmt::print("  all ranks: {:.3g} MB a step; keys exchanged at {} sortings\n",
+             1e-6 * static_cast<double>(halo.bytes_per_step), halo.key_exchanges);
+}
+
 void print_profile(const StageTimers& timers, const std::string& decision, const nlohmann::json& gravity, double wall) {
   fmt::print("{:<20} {:>10} {:>7} {:>10}\n", "stage", "seconds", "%", "calls");
   for (const StageTimers::Stage& s : timers.stages()) {
@@ -206,11 +226,12 @@ nlohmann::json slabs_json(const TimeLoop& loop, const mpi::Comm& comm) {
 
 void print_slabs(const nlohmann::json& slabs) {
   const auto number = [&](const char* key) { return slabs[key].get<double>(); };
-  fmt::print("slabs across {}: imbalance of the counted work {:.3f} on average, {:.3f} at most; cut anew {} times in {} "
-             "windows; {:.3g} kB of halo sent by a rank in a step, {:.3g} at most\n",
-             slabs["axis"].get<std::string>(), number("imbalance_mean"), number("imbalance_max"),
-             slabs["recuts"].get<std::uint64_t>(), slabs["windows"].get<std::uint64_t>(),
-             1e-3 * number("halo_bytes_mean"), 1e-3 * number("halo_bytes_max"));
+  fmt::print(
+      "slabs across {}: imbalance of the counted work {:.3f} on average, {:.3f} at most; cut anew {} times in {} "
+      "windows; {:.3g} kB of halo sent by a rank in a step, {:.3g} at most\n",
+      slabs["axis"].get<std::string>(), number("imbalance_mean"), number("imbalance_max"),
+      slabs["recuts"].get<std::uint64_t>(), slabs["windows"].get<std::uint64_t>(), 1e-3 * number("halo_bytes_mean"),
+      1e-3 * number("halo_bytes_max"));
 }
 
 std::filesystem::path default_folder(const Scene& scene) { return std::filesystem::path("out") / scene.name; }
@@ -238,6 +259,17 @@ std::unique_ptr<TimeLoop> make_loop(const Scene& scene, const std::optional<Rest
     loop = std::make_unique<TimeLoop>(scene, effects, restart->engine, restart->run.loop, threads, comm, make);
   });
   return loop;
+}
+
+// Only the host engine adds in an order that does not depend on the ranks.
+grid::Device device_for(const Scene& scene, grid::Device wanted) {
+  if (!scene.numerics.reproducible) return wanted;
+  if (wanted == grid::Device::kCuda) {
+    throw UsageError(
+        "numerics.reproducible: the same bits on any number of ranks come from the host engine only; run "
+        "with --device host, or without the key");
+  }
+  return grid::Device::kHost;
 }
 
 void print_device(const grid::EngineChoice& engine, const mpi::Comm& comm) {
@@ -310,7 +342,7 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   RunOptions options = options_in;
   if (options.out.empty()) options.out = default_folder(scene);
   const double end = options.until.value_or(scene.time.end);
-  const grid::EngineChoice engine = grid::choose_engine(options.device, comm);
+  const grid::EngineChoice engine = grid::choose_engine(device_for(scene, options.device), comm);
   std::optional<Restart> restart;
   if (options.restart.empty()) {
     io::prepare_output_folder(options.out, comm);
@@ -336,6 +368,9 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   std::uint64_t particles = 0;
   for (const BodyParameters& b : scene.bodies) particles += b.particles;
   io::RunSummary summary;
+  Timeline timeline;
+  const Timeline::Clock::time_point timeline_start = common_start(comm);
+  if (!options.timeline.empty()) loop.record(timeline);
   const auto start = std::chrono::steady_clock::now();
   {
     Interruptions interruptions(options, scene, loop.time(), output, budget, wall_before, first_checkpoint, comm);
@@ -373,14 +408,17 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
     summary.stages.push_back({s.name, s.seconds, s.calls});
     if (s.name == "output" || s.name == "checkpoint") summary.wall_seconds -= s.seconds;
   }
+  summary.halo = halo_timing(loop.engine(), comm);
   summary.gravity = loop.gravity_record().summary(comm);
   summary.slabs = slabs_json(loop, comm);
   summary.scene = options.resolved;
   io::write_summary(options.out / "summary.json", summary, comm);
   if (options.profile && comm.is_root()) {
     print_profile(loop.timers(), loop.gravity_record().decision(), summary.gravity, wall);
+    if (summary.halo) print_halo(*summary.halo);
     if (comm.size() > 1) print_slabs(summary.slabs);
   }
+  if (!options.timeline.empty()) write_timeline(options.timeline, timeline, timeline_start, comm);
 }
 
 }  // namespace breccia::sim

@@ -23,6 +23,7 @@ struct RunOptions {
   int threads = 1;                     ///< OpenMP threads of each rank
   grid::Device device = grid::Device::kAuto;
   bool profile = false;               ///< prints the stage timers at the end
+  std::filesystem::path timeline;     ///< file for what each rank did when in the last steps; empty: none
   std::vector<ResolvedKey> resolved;  ///< for summary.json
 };
 

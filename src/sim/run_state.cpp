@@ -7,6 +7,8 @@
 #include <cmath>
 #include <map>
 #include <string_view>
+#include <type_traits>
+#include <utility>
 #include <variant>
 
 #include "breccia/error.hpp"
@@ -20,6 +22,24 @@ using Json = nlohmann::ordered_json;
 Json finite_or_null(double x) { return std::isfinite(x) ? Json(x) : Json(); }
 double null_is_never(const Json& json) { return json.is_null() ? HUGE_VAL : json.get<double>(); }
 
+template <class T>
+T whole(const Json& json) {
+  const bool fits = json.is_number_unsigned() ? std::in_range<T>(json.get<std::uint64_t>())
+                                              : json.is_number_integer() && std::in_range<T>(json.get<std::int64_t>());
+  if (!fits) throw IoError(fmt::format("the state of the run has {} where a whole number is meant", json.dump()));
+  return json.get<T>();
+}
+
+// The library would take 1e30 for an integer.
+template <class T>
+void read(const Json& json, T& value) {
+  if constexpr (std::is_integral_v<T> && !std::is_same_v<T, bool>) {
+    value = whole<T>(json);
+  } else {
+    json.get_to(value);
+  }
+}
+
 Json row_json(const io::DiagnosticsRow& row) {
   Json json;
   for (const io::DiagnosticsColumn& column : io::diagnostics_columns()) {
@@ -31,7 +51,7 @@ Json row_json(const io::DiagnosticsRow& row) {
 io::DiagnosticsRow row_from(const Json& json) {
   io::DiagnosticsRow row;
   for (const io::DiagnosticsColumn& column : io::diagnostics_columns()) {
-    std::visit([&](auto member) { json.at(column.name).get_to(row.*member); }, column.value);
+    std::visit([&](auto member) { read(json.at(column.name), row.*member); }, column.value);
   }
   return row;
 }
@@ -68,13 +88,13 @@ Json loop_json(const LoopState& loop) {
 
 LoopState loop_from(const Json& json) {
   LoopState loop;
-  json.at("time").get_to(loop.time);
-  json.at("dt").get_to(loop.dt);
-  json.at("previous_dt").get_to(loop.previous_dt);
-  json.at("step").get_to(loop.step);
-  json.at("sort_interval").get_to(loop.sort_interval);
+  read(json.at("time"), loop.time);
+  read(json.at("dt"), loop.dt);
+  read(json.at("previous_dt"), loop.previous_dt);
+  read(json.at("step"), loop.step);
+  read(json.at("sort_interval"), loop.sort_interval);
   for (const Json& work : json.at("lost_work")) {
-    loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>(), work.at(2).get<std::uint64_t>()});
+    loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>(), whole<std::uint64_t>(work.at(2))});
   }
   loop.balance = balance_from(json.at("balance"));
   const bool steps = loop.dt > 0.0 && loop.previous_dt > 0.0 && std::isfinite(loop.dt + loop.previous_dt);
@@ -95,11 +115,11 @@ Json budget_json(const BudgetState& budget) {
 
 BudgetState budget_from(const Json& json) {
   BudgetState budget;
-  json.at("started").get_to(budget.started);
+  read(json.at("started"), budget.started);
   budget.first = row_from(json.at("first"));
-  json.at("momentum_scale").get_to(budget.momentum_scale);
-  json.at("angular_scale").get_to(budget.angular_scale);
-  json.at("energy_scale").get_to(budget.energy_scale);
+  read(json.at("momentum_scale"), budget.momentum_scale);
+  read(json.at("angular_scale"), budget.angular_scale);
+  read(json.at("energy_scale"), budget.energy_scale);
   const Json& drift = json.at("drift");
   budget.drift = {drift.at(0).get<double>(), drift.at(1).get<double>(), drift.at(2).get<double>(),
                   drift.at(3).get<double>()};
@@ -128,9 +148,9 @@ OutputState output_from(const Json& json) {
   OutputState output;
   output.snapshots = schedule_from(json.at("snapshots"));
   output.rows = schedule_from(json.at("rows"));
-  json.at("next_analysis").get_to(output.next_analysis);
-  json.at("snapshot_number").get_to(output.snapshot_number);
-  json.at("wall_seconds").get_to(output.wall_seconds);
+  read(json.at("next_analysis"), output.next_analysis);
+  read(json.at("snapshot_number"), output.snapshot_number);
+  read(json.at("wall_seconds"), output.wall_seconds);
   return output;
 }
 

@@ -7,6 +7,8 @@
 #include <string_view>
 #include <vector>
 
+#include "breccia/timeline.hpp"
+
 namespace breccia::sim {
 
 class StageTimers {
@@ -20,7 +22,7 @@ class StageTimers {
   /// Runs `work` and books its time under `name`.
   template <class F>
   decltype(auto) operator()(std::string_view name, F&& work) {
-    const Running running(stage(name));
+    const Running running(stage(name), timeline_);
     return work();
   }
 
@@ -32,6 +34,8 @@ class StageTimers {
   }
 
   [[nodiscard]] const std::vector<Stage>& stages() const { return stages_; }
+  /// Notes every stage in `timeline` from now on.
+  void record(Timeline* timeline) { timeline_ = timeline; }
 
  private:
   using Clock = std::chrono::steady_clock;
@@ -39,16 +43,19 @@ class StageTimers {
   // Books the time when it goes out of scope, also on an exception.
   class Running {
    public:
-    explicit Running(Stage& stage) : stage_(stage), start_(Clock::now()) {}
+    Running(Stage& stage, Timeline* timeline) : stage_(stage), timeline_(timeline), start_(Clock::now()) {}
     ~Running() {
-      stage_.seconds += std::chrono::duration<double>(Clock::now() - start_).count();
+      const Clock::time_point end = Clock::now();
+      stage_.seconds += std::chrono::duration<double>(end - start_).count();
       ++stage_.calls;
+      if (timeline_ != nullptr) timeline_->add(stage_.name, Timeline::Lane::kStages, start_, end);
     }
     Running(const Running&) = delete;
     Running& operator=(const Running&) = delete;
 
    private:
     Stage& stage_;
+    Timeline* timeline_;
     Clock::time_point start_;
   };
 
@@ -61,6 +68,7 @@ class StageTimers {
   }
 
   std::vector<Stage> stages_;
+  Timeline* timeline_ = nullptr;
 };
 
 }  // namespace breccia::sim

@@ -1,6 +1,7 @@
 #include "sim/time_loop.hpp"
 
 #include <algorithm>
+#include <cmath>
 
 #include "sim/setup.hpp"
 
@@ -80,12 +81,23 @@ void TimeLoop::make_solver(const ResolvedEffects& effects, int threads) {
       .error = scene_.gravity.error,
       .opening = scene_.gravity.opening};
   solver_ = gravity::make_solver(effects.gravity_method, parameters, comm_, threads);
+  auto* particles = dynamic_cast<gravity::ResidentParticles*>(engine_.get());
+  if (particles != nullptr) resident_ = particles->make_resident_solver(effects.gravity_method, parameters);
 }
 
-LoopState TimeLoop::state() const { return {time_, dt_, previous_dt_, step_, sort_interval_, comm_.allgather(lost_), balance_.state()}; }
+void TimeLoop::record(Timeline& timeline) {
+  timeline_ = &timeline;
+  engine_->record(&timeline);
+  timers_.record(&timeline);
+}
+
+LoopState TimeLoop::state() const {
+  return {time_, dt_, previous_dt_, step_, sort_interval_, comm_.allgather(lost_), balance_.state()};
+}
 
 void TimeLoop::run(const Visit& at_time_step, const Visit& at_window_start) {
   for (;;) {
+    if (timeline_ != nullptr) timeline_->begin_step();
     // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
     timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
     if (!at_time_step(*this)) return check();
@@ -124,13 +136,17 @@ void TimeLoop::between_steps() {
   const double largest_move = comm_.max(passes.largest_move);
   timers_("damage", [&] { engine_->finish_damage(); });
   timers_("sort", [&] { engine_->sort(); });
-  if (window_.due()) begin_window();
+  if (window_.due()) {
+    begin_window();
+  } else if (adaptive_) {
+    shorten_step();
+  }
   set_sort_interval(largest_move * dt_ / previous_dt_);
 }
 
 void TimeLoop::begin_window() {
   if (adaptive_) {
-    timers_("time step", [&] { dt_ = stable_step(scene_, engine_->signal_speeds(), viscosity_).seconds; });
+    dt_ = stable_step_now();
     guard_.check_step(dt_, *engine_);
   }
   if (solver_) evaluate_gravity();
@@ -141,20 +157,38 @@ void TimeLoop::balance_ranks() {
   timers_("balance", [&] { balance_.at_window_start(*engine_, solver_.get()); });
 }
 
+// Inside a window dt stays, for which gravity was predicted, unless a shock has used up a quarter of the margin that
+// cfl leaves.
+void TimeLoop::shorten_step() {
+  const double stable = stable_step_now(), limit = stable / scene_.time.cfl;
+  if (dt_ <= stable + 0.25 * (limit - stable)) return;
+  dt_ = stable;
+  guard_.check_step(dt_, *engine_);
+}
+
+double TimeLoop::stable_step_now() {
+  double step = 0.0;
+  timers_("time step", [&] { step = stable_step(scene_, engine_->signal_speeds(), viscosity_).seconds; });
+  return step;
+}
+
 void TimeLoop::evaluate_gravity() {
+  const double time = window_.prediction_time(dt_);
   timers_("gravity", [&] {
+    if (resident_) return resident_->evaluate_and_hold(time);
     std::vector<Vec3d> position;
     std::vector<double> mass;
-    engine_->predict(window_.prediction_time(dt_), position, mass);
+    engine_->predict(time, position, mass);
     std::vector<Vec3d> acceleration(position.size());
     solver_->evaluate({position, mass}, acceleration, {});
     engine_->hold_gravity(acceleration);
   });
-  const gravity::Phases& phases = solver_->last().phases;
+  const gravity::Stats& stats = resident_ ? resident_->last() : solver_->last();
+  const gravity::Phases& phases = stats.phases;
   for (std::size_t k = 0; k < phases.seconds.size(); ++k) {
     if (phases.seconds[k] > 0.0) timers_.add_part("gravity", gravity::kPhaseNames[k], phases.seconds[k]);
   }
-  gravity_record_.add(solver_->last());
+  gravity_record_.add(stats);
 }
 
 void TimeLoop::check() {
@@ -170,8 +204,11 @@ LostWork TimeLoop::lost_work() const {
 }
 
 void TimeLoop::set_sort_interval(double cells_per_step) {
-  // Particles may drift one cell between sortings; half of it is left for those that speed up meanwhile.
-  const double steps = cells_per_step > 0.0 ? 0.5 / cells_per_step : scene_.numerics.sort_interval;
+  // Particles may drift one cell between sortings: half of it with their speed and the uniform field, v n + g n^2/2 =
+  // 1/2 in cells and steps, and half is left for what else speeds them up meanwhile.
+  const double field = std::sqrt(dot(scene_.gravity.uniform, scene_.gravity.uniform)) * dt_ * dt_ / scene_.cell;
+  const double rate = cells_per_step + std::sqrt(cells_per_step * cells_per_step + field);
+  const double steps = rate > 0.0 ? 1.0 / rate : scene_.numerics.sort_interval;
   sort_interval_ = std::clamp(static_cast<int>(std::min(steps, 1e6)), 1, scene_.numerics.sort_interval);
 }
 

@@ -1,9 +1,11 @@
-// The time step as a script: grid, particles, and at the start of a window sorting, gravity and the choice of dt.
+// The time step as a script: grid, particles, and at the start of a window sorting, gravity and the choice of dt, which
+// a shock may shorten at a sorting inside the window.
 #pragma once
 
 #include <functional>
 #include <memory>
 
+#include "gravity/resident.hpp"
 #include "gravity/solver.hpp"
 #include "gravity/window.hpp"
 #include "grid/engine.hpp"
@@ -50,6 +52,8 @@ class TimeLoop {
   [[nodiscard]] const Guard& guard() const { return guard_; }
   [[nodiscard]] const BalanceState& balance() const { return balance_.state(); }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
+  /// Notes in `timeline` what is done when.
+  void record(Timeline& timeline);
 
  private:
   bool one_step(const Visit& at_window_start);
@@ -58,6 +62,8 @@ class TimeLoop {
   void between_steps();
   void check();  // of the guard
   void begin_window();
+  void shorten_step();
+  [[nodiscard]] double stable_step_now();
   void evaluate_gravity();
   void balance_ranks();
   [[nodiscard]] bool sorting_due() const { return steps_since_sort_ + 1 >= sort_interval_; }
@@ -68,7 +74,8 @@ class TimeLoop {
   bool adaptive_;
   mpi::Comm comm_;
   std::unique_ptr<grid::Engine> engine_;
-  std::unique_ptr<gravity::Solver> solver_;  // null: no self-gravity
+  std::unique_ptr<gravity::Solver> solver_;            // null: no self-gravity
+  std::unique_ptr<gravity::ResidentSolver> resident_;  // in its place where the engine can evaluate gravity itself
   gravity::Window window_;
   GravityRecord gravity_record_;
   Guard guard_;
@@ -81,6 +88,7 @@ class TimeLoop {
   int sort_interval_ = 1;
   int steps_since_sort_ = 0;
   mutable StageTimers timers_;
+  Timeline* timeline_ = nullptr;
 };
 
 }  // namespace breccia::sim

@@ -1,56 +1,12 @@
 // The emulation itself: a right kernel is right in any order; each kind of mistake is found.
 #include <gtest/gtest.h>
 
-#include <string>
-
-#include "tests/cuda/faulty_kernels.hpp"
+#include "tests/cuda/faulty_runs.hpp"
 
 namespace breccia::cuda_test {
 namespace {
 
-using cuda_emulation::EmulationError;
 using cuda_emulation::Order;
-constexpr unsigned kBlocks = 5;
-constexpr int kSum = static_cast<int>(kBlocks) * kThreads * (kThreads - 1) / 2;
-
-template <Fault kFault>
-int run(Order order) {
-  cuda_emulation::set_order(order, 7);
-  cudaStream_t stream = nullptr;
-  EXPECT_EQ(cudaStreamCreate(&stream), cudaSuccess);
-  void* total = nullptr;
-  EXPECT_EQ(cudaMalloc(&total, sizeof(int)), cudaSuccess);
-  EXPECT_EQ(cudaMemsetAsync(total, 0, sizeof(int), stream), cudaSuccess);
-  int result = 0;
-  std::string error;
-  try {
-    BRECCIA_LAUNCH(sum_of_blocks<kFault>, dim3(kBlocks), dim3(kThreads), sizeof(Values), stream,
-                   static_cast<int*>(total));
-    EXPECT_EQ(cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream), cudaSuccess);
-  } catch (const EmulationError& e) {
-    error = e.what();
-  }
-  try {
-    EXPECT_EQ(cudaFree(total), cudaSuccess);
-  } catch (const EmulationError& e) {
-    error = e.what();
-  }
-  cudaStreamDestroy(stream);
-  if (!error.empty()) throw EmulationError(error);
-  return result;
-}
-
-template <Fault kFault>
-std::string error_of(Order order = Order::kRandom) {
-  try {
-    run<kFault>(order);
-  } catch (const EmulationError& error) {
-    return error.what();
-  }
-  return "";
-}
-
-bool says(const std::string& text, const std::string& part) { return text.find(part) != std::string::npos; }
 
 TEST(Emulation, RightKernelGivesTheSameInAnyOrder) {
   for (const Order order : {Order::kForward, Order::kReverse, Order::kRandom})

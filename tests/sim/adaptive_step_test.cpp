@@ -1,4 +1,5 @@
-// Steps chosen by the stability limit: changed at window starts only, second order, stable (physics.md 5).
+// Steps chosen by the stability limit: changed at window starts, shortened inside a window by shocks only; second
+// order, stable (physics.md 5).
 #include <gtest/gtest.h>
 
 #include <optional>
@@ -50,13 +51,38 @@ TEST_P(AdaptiveStep, FollowsTheLimitAtWindowStarts) {
       dt = loop.dt();
       EXPECT_NEAR(dt, 0.4 * limit, 0.01 * limit) << "step " << loop.step();
     }
-    EXPECT_EQ(loop.dt(), dt) << "step " << loop.step();
+    EXPECT_EQ(loop.dt(), dt) << "step " << loop.step();  // too mild a change to shorten it
     EXPECT_LT(dt, 0.6 * limit) << "step " << loop.step();
     smallest = std::min(smallest, dt);
     largest = std::max(largest, dt);
     return loop.time() < 0.15;
   });
   EXPECT_GT(largest, 1.2 * smallest);
+}
+
+// Balls that meet at 1.8 times their sound speed within one window: compression and heat raise the sound speed and the
+// viscosity many times over before the next. Held through the window the first step breaks the run within a few; the
+// limit is looked at whenever particles are sorted, which is at every step or two at such speeds. What a step that
+// stands unchanged may come to in between is less than the limit itself.
+TEST_P(AdaptiveStep, IsShortenedByAShockInsideAWindow) {
+  const Scene scene =
+      load(kSoftCollision, {precision(), "gravity.interval=256", "numerics.sort_interval=64",
+                            "body[0].velocity=[\"25 m/s\", 0, 0]", "body[1].velocity=[\"-25 m/s\", 0, 0]"});
+  std::optional<Budget> budget;
+  double first_dt = 0.0, dt = HUGE_VAL, kinetic = 0.0, gained = 0.0;
+  simulate(scene, [&](const TimeLoop& loop) {
+    const double limit = stable_step(scene, loop.engine().signal_speeds(), true).seconds / scene.time.cfl;
+    EXPECT_LT(loop.dt(), limit) << "step " << loop.step();
+    EXPECT_LE(loop.dt(), dt) << "grows inside a window, step " << loop.step();
+    if (!budget) budget.emplace(nullptr, Vec3d{}, mpi::Comm(MPI_COMM_SELF));
+    const io::DiagnosticsRow row = budget->row(loop.engine(), loop.engine().observe(), loop.lost_work());
+    if (loop.step() == 0) first_dt = loop.dt(), kinetic = row.kinetic_energy;
+    dt = loop.dt();
+    gained = std::max(gained, row.energy_residual);
+    return loop.step() < 255 && loop.time() < 0.05;
+  });
+  EXPECT_LT(dt, 0.5 * first_dt);
+  EXPECT_LT(gained, 1e-3 * kinetic);
 }
 
 // Kinetic energy and budget after a gentler collision, of the kinetic energy before it.
@@ -130,6 +156,24 @@ uniform = ["20 m/s2", 0, "-3 m/s2"]
     return t < 20.0;
   });
   EXPECT_LT(dt, 0.1 * first_step);
+}
+
+// From rest nothing tells how far particles will have moved before the next sorting but the field they fall in: 25
+// cells in the 100 steps that numerics.sort_interval allows here. Two balls, so that the grid is used. Mixed:
+// velocities up to 100 m/s round to 4e-6 m/s.
+TEST_P(AdaptiveStep, SortsOftenEnoughForAFallFromRest) {
+  const Scene scene =
+      load(kSoftCollision, {precision(), "grid.cell=\"0.2 m\"", "time.step=\"1 ms\"", "numerics.sort_interval=100",
+                            "gravity.interval=200", "gravity.uniform=[0, 0, \"1000 m/s2\"]",
+                            "body[0].velocity=[0, 0, 0]", "body[1].velocity=[0, 0, 0]"});
+  simulate(scene, [&](const TimeLoop& loop) {
+    if (loop.step() < 100) return true;
+    const ParticleOutput p = loop.engine().observe();
+    double height = 0.0;
+    for (std::size_t i = 0; i < p.size(); ++i) height += p.position[i].z / static_cast<double>(p.size());
+    EXPECT_NEAR(height, 0.5 * 1000.0 * loop.time() * loop.time(), 1e-3);
+    return false;
+  });
 }
 
 INSTANTIATE_TEST_SUITE_P(Precisions, AdaptiveStep, testing::Values("mixed", "double"));

@@ -224,6 +224,20 @@ TEST(Checkpoint, RunStatesThatAreNone) {
   EXPECT_THROW(static_cast<void>(run_state_from("{}")), IoError);
 }
 
+// A conversion to an integer that it does not fit into is undefined (found by the fuzzer).
+TEST(Checkpoint, WholeNumbersOfTheRunStateAreWholeAndFit) {
+  RunState run;
+  run.loop.dt = run.loop.previous_dt = 0.25;
+  run.loop.step = 24;
+  const std::string text = to_text(run), step = "\"step\": 24";
+  ASSERT_NE(text.find(step), std::string::npos);
+  for (const char* value : {"6.6e25", "2.5", "-1", "1e300", "true", "\"24\""}) {
+    std::string broken = text;
+    broken.replace(text.find(step), step.size(), std::string("\"step\": ") + value);
+    EXPECT_THROW(static_cast<void>(run_state_from(broken)), IoError) << value;
+  }
+}
+
 // Mixed precision, damage growing: what there is most of. HDF5's own tables are some kB.
 TEST(Checkpoint, BytesPerParticle) {
   const mpi::Comm comm;

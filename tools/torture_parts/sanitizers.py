@@ -7,7 +7,7 @@ import subprocess
 from torture_parts import clang
 
 # The threaded engine: every loop over threads, the sweep with its phases, gravity, and whole runs.
-THREADED = ("test_sim_threads", "test_grid_reference", "test_gravity_tree", "test_gravity_direct_sum")
+THREADED = ("test_sim_threads", "test_grid_reference", "test_gravity_tree", "test_gravity_direct")
 QUICK_THREADED = ("test_sim_threads",)
 
 

@@ -2,10 +2,12 @@
 // scheduler itself reads and writes is no business of the kernels.
 #include "tests/cuda/emulation/cuda_emulation.hpp"
 
+#include <cxxabi.h>
 #include <sys/mman.h>
 
 #include <algorithm>
 #include <array>
+#include <cstdlib>
 #include <memory>
 #include <numeric>
 #include <random>
@@ -65,7 +67,8 @@ class Ordering {
 
 class Machine {
  public:
-  void run(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes, const std::function<void()>& body);
+  void run(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes,
+           const std::function<void()>& body);
 
   [[nodiscard]] dim3 lane_index() const { return unflattened(current_, block_); }
   [[nodiscard]] dim3 block_index() const { return unflattened(block_number_, grid_); }
@@ -73,6 +76,8 @@ class Machine {
   [[nodiscard]] dim3 grid_size() const { return grid_; }
   [[nodiscard]] unsigned lane_of_warp() const { return current_ % kWarp; }
   [[nodiscard]] void* shared() const { return shared_.address(); }
+  [[nodiscard]] std::size_t shared_bytes() const { return shared_bytes_; }
+  [[noreturn]] void stop(const std::string& what);
   unsigned wait_for_block(unsigned value, int line);
   std::uint64_t wait_for_lanes(Collective kind, unsigned mask, std::uint64_t value, unsigned source, int line);
   void lane_main();
@@ -108,6 +113,7 @@ class Machine {
   std::vector<unsigned> lane_order_;
   std::vector<std::unique_ptr<Lane>> lane_;
   SharedArena shared_;
+  std::size_t shared_bytes_ = 0;
   const std::function<void()>* body_ = nullptr;
   Ordering ordering_;
   unsigned barriers_ = 0;                   // complete
@@ -128,10 +134,11 @@ std::vector<unsigned> Machine::permutation(unsigned n) {
   return p;
 }
 
-void Machine::run(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes,
+void Machine::run(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes,
                   const std::function<void()>& body) {
-  if (running_) throw EmulationError(std::string(kernel) + ": launched by a kernel");
+  if (running_) throw EmulationError(kernel + ": launched by a kernel");
   kernel_ = kernel;
+  shared_bytes_ = shared_bytes;
   grid_ = grid;
   block_ = block;
   lanes_ = count(block);
@@ -210,6 +217,11 @@ void Machine::lane_main() {
   lane.state = State::kDone;
   ordering_.lane_ends();
   lane.fiber.leave(true);
+}
+
+void Machine::stop(const std::string& what) {
+  mistake_ = description(current_, what);
+  for (;;) wait();
 }
 
 void Machine::wait() { lane_[current_]->fiber.leave(false); }
@@ -346,12 +358,34 @@ void Machine::explain_standstill() const {
 
 }  // namespace
 
+// Of "...KernelTag<&(void space::kernel<float>(int))>" the name with its template arguments.
+std::string kernel_name(const char* mangled) {
+  char* const demangled = abi::__cxa_demangle(mangled, nullptr, nullptr, nullptr);
+  if (demangled == nullptr) return mangled;
+  std::string text = demangled;
+  std::free(demangled);
+  const std::string unnamed = "(anonymous namespace)::";
+  for (std::size_t at = text.find(unnamed); at != std::string::npos; at = text.find(unnamed, at))
+    text.erase(at, unnamed.size());
+  std::size_t start = text.find('&') + 1;
+  int depth = 0;
+  for (std::size_t n = start; n < text.size(); ++n) {
+    if (text[n] == '<') ++depth;
+    if (text[n] == '>') --depth;
+    if (depth > 0) continue;
+    const bool parameters = text[n] == '(' && start < n;
+    if (parameters || depth < 0) return text.substr(start, n - start);
+    if (text[n] == ' ' || text[n] == ':' || text[n] == '(') start = n + 1;
+  }
+  return text;
+}
+
 void set_order(Order order, std::uint64_t seed) {
   machine().order = order;
   machine().random.seed(seed);
 }
 
-void run_kernel(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes,
+void run_kernel(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes,
                 const std::function<void()>& body) {
   machine().run(kernel, grid, block, shared_bytes, body);
 }
@@ -362,6 +396,8 @@ dim3 block_size() { return machine().block_size(); }
 dim3 grid_size() { return machine().grid_size(); }
 unsigned lane_of_warp() { return machine().lane_of_warp(); }
 void* shared_memory() { return machine().shared(); }
+std::size_t shared_bytes() { return machine().shared_bytes(); }
+void stop_kernel(const std::string& what) { machine().stop(what); }
 void synchronise_block(int line) { machine().wait_for_block(0, line); }
 unsigned reduce_block(unsigned value, int line) { return machine().wait_for_block(value, line); }
 std::uint64_t warp_collective(Collective kind, unsigned mask, std::uint64_t value, unsigned source, int line) {

@@ -6,12 +6,18 @@
 // access.
 #pragma once
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstring>
 #include <functional>
+#include <map>
+#include <span>
 #include <stdexcept>
 #include <string>
+#include <type_traits>
+#include <typeinfo>
+#include <vector>
 
 #include "tests/cuda/emulation/runtime_api.hpp"
 
@@ -35,14 +41,45 @@ std::uint64_t synchronisation_count();
 /// Allocations of device memory that are not freed.
 std::size_t live_allocations();
 
-void launch(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
+/// What runs in place of a kernel: takes its parameters one behind the other, laid out as in a struct.
+struct Substitute {
+  std::vector<std::size_t> parameter_bytes;
+  void (*run)(const std::byte* parameters);
+};
+using Substitutes = std::map<std::string, Substitute>;
+/// From now on these run in place of the kernels of their names; a launch of another one is an error. Null: the kernels
+/// themselves. The table must outlive its use.
+void substitute_kernels(const Substitutes* by_name);
+
+/// tile_pass<float> of what the compiler calls a type that names the kernel.
+std::string kernel_name(const char* mangled);
+
+void launch(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
             std::function<void()> body);
+/// The substitute of a kernel, or null. Throws EmulationError if the sizes of its parameters are others.
+const Substitute* substitute_for(const std::string& kernel, const std::vector<std::size_t>& parameter_bytes);
+
+template <class T>
+void append_parameter(std::vector<std::byte>& parameters, const T& value) {
+  parameters.resize((parameters.size() + alignof(T) - 1) / alignof(T) * alignof(T) + sizeof(T));
+  std::memcpy(parameters.data() + parameters.size() - sizeof(T), &value, sizeof(T));
+}
+
+template <auto kKernel>
+struct KernelTag {};
 
 /// Arguments are copied at the launch, as for a device.
-template <class Kernel, class... Arguments>
-void launch_with(const char* name, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream, Kernel kernel,
-                 Arguments... arguments) {
-  launch(name, grid, block, shared_bytes, stream, [=] { kernel(arguments...); });
+template <auto kKernel, class... Parameters>
+void launch_kernel(void (*kernel)(Parameters...), dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
+                   std::type_identity_t<Parameters>... arguments) {
+  const std::string name = kernel_name(typeid(KernelTag<kKernel>).name());
+  if (const Substitute* substitute = substitute_for(name, {sizeof(Parameters)...})) {
+    std::vector<std::byte> parameters;
+    (append_parameter(parameters, arguments), ...);
+    launch(name, grid, block, shared_bytes, stream, [run = substitute->run, parameters] { run(parameters.data()); });
+  } else {
+    launch(name, grid, block, shared_bytes, stream, [=] { kernel(arguments...); });
+  }
 }
 
 // What runs inside a kernel.
@@ -51,6 +88,12 @@ dim3 block_index();
 dim3 block_size();
 dim3 grid_size();
 void* shared_memory();
+std::size_t shared_bytes();
+/// Ends the launch with an EmulationError that says where.
+[[noreturn]] void stop_kernel(const std::string& what);
+/// The allocation that holds an address, or nothing; valid while the generation stays the same.
+std::span<const unsigned char> allocation_of(const void* address);
+std::uint64_t allocation_generation();
 void synchronise_block(int line);
 unsigned reduce_block(unsigned value, int line);  // sum over the block, at a barrier
 
@@ -72,8 +115,7 @@ unsigned lane_of_warp();
 }  // namespace breccia::cuda_emulation
 
 #define BRECCIA_LAUNCH(kernel, grid, block, shared_bytes, stream, ...) \
-  breccia::cuda_emulation::launch_with(                                \
-      #kernel, grid, block, shared_bytes, stream, [](auto... arguments) { kernel(arguments...); }, __VA_ARGS__)
+  breccia::cuda_emulation::launch_kernel<&kernel>(&kernel, grid, block, shared_bytes, stream, __VA_ARGS__)
 // NOLINTNEXTLINE(bugprone-macro-parentheses): a type
 #define BRECCIA_SHARED(Type, name) Type& name = *static_cast<Type*>(breccia::cuda_emulation::shared_memory())
 
@@ -119,6 +161,8 @@ T __shfl_down_sync(unsigned mask, T value, unsigned delta, int line = __builtin_
   const unsigned lane = breccia::cuda_emulation::lane_of_warp();
   return breccia::cuda_emulation::shuffle(mask, value, lane + delta < 32 ? lane + delta : lane, line);
 }
+inline float rsqrtf(float x) { return 1.0F / std::sqrt(x); }
+inline double rsqrt(double x) { return 1.0 / std::sqrt(x); }
 inline int __popc(unsigned x) { return __builtin_popcount(x); }
 inline int __ffs(int x) { return __builtin_ffs(x); }
 inline int __clz(int x) { return x == 0 ? 32 : __builtin_clz(static_cast<unsigned>(x)); }

@@ -17,7 +17,8 @@ struct EmulatedStream {
 
 namespace breccia::cuda_emulation {
 
-void run_kernel(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes, const std::function<void()>& body);
+void run_kernel(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes,
+                const std::function<void()>& body);
 
 namespace {
 
@@ -32,14 +33,20 @@ constexpr unsigned char kFill = 0xff;
 struct Memory {
   std::map<const unsigned char*, std::size_t> allocations;
   std::size_t used = 0;
+  std::uint64_t generation = 1;  // changes with the allocations
 
-  // Whether all of [address, address + bytes) lies in one allocation.
-  [[nodiscard]] bool holds(const void* address, std::size_t bytes) const {
+  [[nodiscard]] std::span<const unsigned char> around(const void* address) const {
     const auto* a = static_cast<const unsigned char*>(address);
     auto next = allocations.upper_bound(a);
-    if (next == allocations.begin()) return false;
+    if (next == allocations.begin()) return {};
     --next;
-    return a + bytes <= next->first + next->second;
+    if (a >= next->first + next->second) return {};
+    return {next->first, next->second};
+  }
+  // Whether all of [address, address + bytes) lies in one allocation.
+  [[nodiscard]] bool holds(const void* address, std::size_t bytes) const {
+    const std::span<const unsigned char> found = around(address);
+    return !found.empty() && static_cast<const unsigned char*>(address) + bytes <= found.data() + found.size();
   }
 };
 Memory& memory() {
@@ -48,6 +55,7 @@ Memory& memory() {
 }
 
 std::uint64_t launches = 0;
+const Substitutes* substitutes = nullptr;
 std::uint64_t synchronisations = 0;
 
 // Now, or as a part of the graph that the stream captures.
@@ -65,7 +73,21 @@ std::uint64_t launch_count() { return launches; }
 std::uint64_t synchronisation_count() { return synchronisations; }
 std::size_t live_allocations() { return memory().allocations.size(); }
 
-void launch(const char* kernel, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
+std::span<const unsigned char> allocation_of(const void* address) { return memory().around(address); }
+std::uint64_t allocation_generation() { return memory().generation; }
+
+void substitute_kernels(const Substitutes* by_name) { substitutes = by_name; }
+
+const Substitute* substitute_for(const std::string& kernel, const std::vector<std::size_t>& parameter_bytes) {
+  if (substitutes == nullptr) return nullptr;
+  const auto found = substitutes->find(kernel);
+  if (found == substitutes->end()) throw EmulationError(kernel + " has no translation");
+  if (found->second.parameter_bytes != parameter_bytes)
+    throw EmulationError(kernel + ": its parameters have other sizes where it was translated");
+  return &found->second;
+}
+
+void launch(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
             std::function<void()> body) {
   enqueue(stream, [=, body = std::move(body)] {
     ++launches;
@@ -117,6 +139,7 @@ cudaError_t cudaMalloc(void** address, std::size_t bytes) {
   if (start == nullptr) return cudaErrorMemoryAllocation;
   std::memset(start, kFill, bytes + 2 * kGuard);
   memory().allocations[start + kGuard] = bytes;
+  ++memory().generation;
   memory().used += bytes;
   *address = start + kGuard;
   return cudaSuccess;
@@ -133,6 +156,7 @@ cudaError_t cudaFree(void* address) {
   for (std::size_t n = 1; n <= kGuard; ++n) intact = intact && *(start - n) == kFill && start[bytes + n - 1] == kFill;
   memory().used -= bytes;
   memory().allocations.erase(found);
+  ++memory().generation;
   std::free(start - kGuard);
   if (!intact) throw EmulationError("a kernel wrote outside of an allocation of " + std::to_string(bytes) + " bytes");
   return cudaSuccess;

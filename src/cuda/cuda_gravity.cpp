@@ -1,0 +1,123 @@
+#include "cuda/cuda_gravity.hpp"
+
+#include <array>
+#include <cmath>
+#include <string>
+#include <utility>
+
+#include "breccia/constants.hpp"
+#include "cuda/direct_gravity.hpp"
+#include "gravity/evaluation.hpp"
+#include "gravity/method.hpp"
+#include "gravity/tree/tolerance.hpp"
+#include "gravity/tree/tree.hpp"
+
+namespace breccia::cuda {
+
+using gravity::Phase;
+
+template <class Real>
+CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles,
+                               const mpi::Comm& comm, cudaStream_t stream)
+    : method_(method),
+      parameters_(parameters),
+      particles_(std::move(particles)),
+      comm_(comm),
+      stream_(stream),
+      bodies_(comm, stream),
+      tree_(stream),
+      walk_(stream) {}
+
+template <class Real>
+bool CudaGravity<Real>::has(GravityMethod method) {
+  return method == GravityMethod::kDirect || method == GravityMethod::kTree || method == GravityMethod::kAuto;
+}
+
+template <class Real>
+void CudaGravity<Real>::choose_method(unsigned particles) {
+  stats_.method = method_;
+  if (method_ != GravityMethod::kAuto) return;
+  if (particles <= kMostDirect || parameters_.error < gravity::kSmallestTreeError) {
+    stats_.method = GravityMethod::kDirect;
+    stats_.reason = "direct sum on the device for up to " + std::to_string(kMostDirect) + " particles";
+  } else {
+    stats_.method = GravityMethod::kTree;
+    stats_.reason = "tree on the device for more than " + std::to_string(kMostDirect) + " particles";
+  }
+}
+
+template <class Real>
+void CudaGravity<Real>::evaluate_and_hold(double time) {
+  const PredictArguments<Real> own = particles_(time);
+  stats_ = {};
+  const gravity::Stopwatch watch(stats_.seconds);
+  stats_.phases.time(Phase::kExchange, [&] { bodies_.gather(own); });
+  stats_.bytes_sent = bodies_.bytes_sent();
+  const Extremes extremes = bodies_.extremes();
+  const double mass_unit = extremes.of[6] > 0.0 ? extremes.of[6] : 1.0;
+
+  acceleration_.reserve(3 * std::size_t{own.count});
+  choose_method(bodies_.all().count);
+  if (stats_.method == GravityMethod::kDirect) {
+    stats_.phases.time(Phase::kPairs, [&] { sum_directly(mass_unit); });
+  } else {
+    sum_by_tree(extremes, mass_unit);
+  }
+  const Vec3d net = net_force(own);
+  launch_hold(acceleration_.data(), net, own.particles, own.count, stream_);
+}
+
+template <class Real>
+void CudaGravity<Real>::sum_directly(double mass_unit) {
+  const BodyArrays all = bodies_.all();
+  launch_direct_sum<Real>({all, bodies_.first(), bodies_.own(), mass_unit, parameters_.softening}, acceleration_.data(),
+                          scratch_, stream_);
+  stats_.pairs = static_cast<double>(bodies_.own()) * static_cast<double>(all.count);
+}
+
+template <class Real>
+void CudaGravity<Real>::sum_by_tree(const Extremes& extremes, double mass_unit) {
+  const BodyArrays all = bodies_.all();
+  if (all.count == 0) return;
+  const double(&e)[7] = extremes.of;
+  const gravity::Root root = gravity::random_root({-e[3], -e[4], -e[5]}, {e[0], e[1], e[2]});
+  const double softening = parameters_.softening / root.unit;
+  stats_.phases.time(Phase::kSort,
+                     [&] { tree_.build(all, root, mass_unit, softening, bodies_.first(), bodies_.own()); });
+  stats_.phases.time(Phase::kTree, [&] {
+    walk_.evaluate(tree_,
+                   {.tolerance = gravity::opening_for(parameters_),
+                    .softening = softening,
+                    .first = bodies_.first(),
+                    .own = bodies_.own(),
+                    .unit = kGravitationalConstant * mass_unit / (root.unit * root.unit)},
+                   acceleration_.data());
+    const WalkCounts counts = walk_.counts();
+    stats_.pairs = static_cast<double>(counts.pairs);
+    stats_.cell_interactions = static_cast<double>(counts.cells);
+    stats_.expansions = static_cast<double>(counts.expansions);
+  });
+}
+
+// Books the momentum error; returns what is to be taken off each particle, as a share of its |a|.
+template <class Real>
+Vec3d CudaGravity<Real>::net_force(const PredictArguments<Real>& own) {
+  net_forces_.reserve(kReducers);
+  launch_net_force(acceleration_.data(), own.particles.mass, own.count, net_forces_.data(), stream_);
+  std::array<double, 4> sums{};
+  for (const NetForce& part : net_forces_.download(kReducers, stream_)) {
+    for (std::size_t k = 0; k < 4; ++k) sums[k] += part.of[k];
+  }
+  comm_.sum(std::span<double>(sums));
+  const Vec3d net{sums[0], sums[1], sums[2]};
+  if (!(sums[3] > 0.0)) return {};
+  stats_.momentum_error = std::sqrt(dot(net, net)) / sums[3];
+  if (stats_.method == GravityMethod::kDirect) return {};  // pairwise: what there is of it is rounding
+  stats_.net_force_removed = net;
+  return (1.0 / sums[3]) * net;
+}
+
+template class CudaGravity<float>;
+template class CudaGravity<double>;
+
+}  // namespace breccia::cuda

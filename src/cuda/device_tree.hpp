@@ -1,0 +1,48 @@
+// The tree of gravity over the bodies of all ranks, built and kept in device memory. It is the tree of the host
+// (gravity/tree/tree.hpp), cell by cell, on any number of ranks.
+#pragma once
+
+#include <vector>
+
+#include "cuda/device_array.hpp"
+#include "cuda/primitives.hpp"
+#include "cuda/tree_kernels.hpp"
+
+namespace breccia::cuda {
+
+class DeviceTree {
+ public:
+  explicit DeviceTree(cudaStream_t stream) : stream_(stream) {}
+
+  /// Sorts the bodies, of which [first, first + own) are this rank's, grows the tree and weighs its cells. There must
+  /// be one. The host waits once for each level.
+  void build(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, double softening, unsigned first,
+             unsigned own);
+
+  [[nodiscard]] TreeView view() const;
+  [[nodiscard]] SortedBodies bodies() const;
+
+ private:
+  void sort(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, unsigned first, unsigned own);
+  void grow();
+  void weigh(double softening);
+  void make_room(unsigned cells);
+
+  cudaStream_t stream_;
+  unsigned count_ = 0;  // of bodies
+  unsigned cells_in_use_ = 0;
+  std::vector<Level> levels_;
+  PrimitiveScratch scratch_;
+  DeviceArray<std::uint64_t> keys_;
+  DeviceArray<unsigned> order_, own_before_;
+  DeviceArray<double> sorted_;  // [4][bodies]
+  DeviceArray<gravity::Cell> cells_;
+  DeviceArray<std::int32_t> next_;
+  DeviceArray<Role> role_;
+  DeviceArray<double> scale_;
+  DeviceArray<HeavyCells> heavy_;
+  DeviceArray<unsigned> children_;
+  DeviceArray<std::int32_t> bounds_, bits_;
+};
+
+}  // namespace breccia::cuda

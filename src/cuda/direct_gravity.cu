@@ -1,0 +1,80 @@
+#include <algorithm>
+
+#include "breccia/constants.hpp"
+#include "cuda/direct_gravity.hpp"
+#include "cuda/gravity_pairs.cuh"
+#include "cuda/launchers.hpp"
+
+namespace breccia::cuda {
+namespace {
+
+// Thread blocks that fill any device. Few targets share out their sources among so many.
+constexpr unsigned kWantedBlocks = 1024;
+
+__device__ __forceinline__ Vec3d position_of(const BodyArrays& bodies, unsigned i) {
+  return {bodies.position[0][i], bodies.position[1][i], bodies.position[2][i]};
+}
+
+// sums[slice][3][targets] of the sources [slice * tiles, (slice + 1) * tiles) tiles.
+template <class Real>
+__global__ void __launch_bounds__(kTileSources) direct_sum(DirectArguments a, unsigned tiles, double* sums) {
+  BRECCIA_SHARED(PairTile<Real>, tile);
+  const BodyArrays& sources = a.sources;
+  const unsigned i = blockIdx.x * kTileSources + threadIdx.x;
+  PointMass<Real> target;
+  target.set(position_of(sources, a.first + (i < a.targets ? i : 0)), 0.0);
+  const auto softening = static_cast<Real>(a.softening * a.softening);
+  const double per_unit = 1.0 / a.mass_unit;
+  Vec3d sum{};
+  const unsigned begin = blockIdx.y * tiles * kTileSources;
+  for (unsigned t = 0; t < tiles; ++t) {
+    const unsigned from = begin + t * kTileSources;
+    if (from >= sources.count) break;
+    const unsigned count = sources.count - from < kTileSources ? sources.count - from : kTileSources;
+    if (threadIdx.x < count) {
+      const unsigned j = from + threadIdx.x;
+      tile.source[threadIdx.x].set(position_of(sources, j), per_unit * sources.mass[j]);
+    }
+    __syncthreads();
+    sum += sum_of_tile(tile, count, target, softening);
+    __syncthreads();
+  }
+  if (i >= a.targets) return;
+  double* own = sums + 3 * std::size_t{blockIdx.y} * a.targets + i;
+  own[0] = sum.x;
+  own[a.targets] = sum.y;
+  own[2 * std::size_t{a.targets}] = sum.z;
+}
+
+// Adds the slices in their order.
+__global__ void __launch_bounds__(kTileSources)
+    add_slices(const double* sums, unsigned values, unsigned slices, double unit, double* acceleration) {
+  const unsigned i = blockIdx.x * kTileSources + threadIdx.x;
+  if (i >= values) return;
+  double sum = 0.0;
+  for (unsigned slice = 0; slice < slices; ++slice) sum += sums[std::size_t{slice} * values + i];
+  acceleration[i] = unit * sum;
+}
+
+}  // namespace
+
+template <class Real>
+void launch_direct_sum(const DirectArguments& a, double* acceleration, DeviceArray<double>& scratch,
+                       cudaStream_t stream) {
+  if (a.targets == 0) return;
+  const unsigned blocks = blocks_for(a.targets, kTileSources);
+  const unsigned all_tiles = blocks_for(a.sources.count, kTileSources);
+  const unsigned tiles = blocks_for(all_tiles, std::clamp(blocks_for(kWantedBlocks, blocks), 1U, all_tiles));
+  const unsigned slices = blocks_for(all_tiles, tiles);
+  const unsigned values = 3 * a.targets;
+  scratch.reserve(std::size_t{slices} * values);
+  BRECCIA_LAUNCH(direct_sum<Real>, dim3(blocks, slices), dim3(kTileSources), sizeof(PairTile<Real>), stream, a, tiles,
+                 scratch.data());
+  BRECCIA_LAUNCH(add_slices, dim3(blocks_for(values, kTileSources)), dim3(kTileSources), 0, stream, scratch.data(),
+                 values, slices, kGravitationalConstant * a.mass_unit, acceleration);
+  check(cudaGetLastError(), "launch of a direct sum");
+}
+template void launch_direct_sum<float>(const DirectArguments&, double*, DeviceArray<double>&, cudaStream_t);
+template void launch_direct_sum<double>(const DirectArguments&, double*, DeviceArray<double>&, cudaStream_t);
+
+}  // namespace breccia::cuda

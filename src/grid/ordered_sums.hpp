@@ -1,0 +1,98 @@
+// Sums that do not depend on how the grid is cut (numerics.reproducible): one rank alone adds the tiles that reach a
+// node in the order of their turns and keys (sweep_plan.hpp). Where slabs meet, and where the boundary tiles run before
+// others that should have come first, every tile therefore adds to blocks of its own, and the owner of a block adds up
+// what tiles gave to it in that same order.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "grid/blocks.hpp"
+#include "grid/tile.hpp"
+#include "mpi/halo.hpp"
+#include "mpi/standing_requests.hpp"
+
+namespace breccia::grid {
+
+/// Where the sums of an owned block come from.
+enum class BlockSums : std::uint8_t {
+  kInPlace,    ///< all tiles add to it directly, on this rank
+  kCollected,  ///< tiles of this rank alone, added up in order
+  kShared      ///< other ranks add to it, too
+};
+
+/// What a tile gives to a block.
+struct Contribution {
+  BlockKey tile;
+  BlockKey block;
+  std::int32_t neighbour;  ///< index of the block in Tile::neighbours
+  std::int32_t turn;       ///< of the tile
+
+  friend bool operator==(const Contribution&, const Contribution&) = default;
+};
+
+/// The nodes that contributions travel through.
+struct ContributionMessages {
+  std::vector<mpi::SharedNodes> sent, received;
+};
+
+class OrderedSums {
+ public:
+  /// Gives tiles that reach blocks of other ranks, shared or collected blocks blocks of their own to add to, stored
+  /// behind those of `blocks`. `owner(block)` is a rank; `period` as in sweep_plan.hpp. Collective.
+  template <class Owner>
+  ContributionMessages connect(std::span<const Tile> tiles, const BlockTable& blocks, std::span<const BlockSums> owned,
+                               std::int32_t period, Owner&& owner, const mpi::Comm& comm) {
+    begin(tiles, blocks, comm.size());
+    for (std::uint32_t t = 0; t < tiles.size(); ++t) {
+      for (int n = 0; n < 27; ++n) {
+        const std::uint32_t block = tiles[t].neighbours[n];
+        if (block == kNoBlock || (block < owned.size() && owned[block] == BlockSums::kInPlace)) continue;
+        const BlockKey tile = blocks.keys()[t];
+        const Contribution c{tile, blocks.keys()[block], n, sweep_turn_of(tile, period)};
+        add(t, block, c, block < owned.size() ? comm.rank() : owner(block_coord(c.block)), comm.rank());
+      }
+    }
+    return finish(blocks, owned, comm);
+  }
+
+  /// The tiles, with the blocks they add to as neighbours.
+  [[nodiscard]] std::span<const Tile> targets() const { return targets_; }
+  /// Blocks in the array of sums, those of tiles included.
+  [[nodiscard]] std::size_t blocks() const { return end_; }
+  /// How many blocks are added up: the shared ones first, then the collected ones.
+  [[nodiscard]] std::size_t sums() const { return sums_.size(); }
+  [[nodiscard]] std::size_t shared_sums() const { return shared_; }
+
+  /// Adds up the sum `i` into its block, marks its rows and clears what it took.
+  template <class Real>
+  void add_up(std::size_t i, Real* sums, RowMask* rows) const;
+
+ private:
+  struct Part {
+    std::uint32_t block;
+    Contribution what;
+    std::uint32_t from;  ///< block it lies in
+    RowMask rows;        ///< of a received one; those of others are marked where they lie
+  };
+  struct Sum {
+    std::uint32_t block, first, last;  ///< parts
+  };
+
+  static int sweep_turn_of(BlockKey tile, std::int32_t period);
+  void begin(std::span<const Tile> tiles, const BlockTable& blocks, int ranks);
+  void add(std::uint32_t tile, std::uint32_t block, const Contribution& c, int rank, int self);
+  ContributionMessages finish(const BlockTable& blocks, std::span<const BlockSums> owned, const mpi::Comm& comm);
+
+  std::vector<Tile> targets_;
+  std::vector<Part> parts_;
+  std::vector<Sum> sums_;
+  std::size_t shared_ = 0;
+  std::uint32_t end_ = 0;
+  std::vector<std::vector<Contribution>> given_;        // to each rank
+  std::vector<std::vector<std::uint32_t>> given_from_;  // the blocks they lie in
+  mpi::StandingRequests<Contribution> requests_;
+};
+
+}  // namespace breccia::grid

@@ -1,0 +1,131 @@
+// The code that nvcc emits, executed: the engine on the emulated device, every kernel of it translated from PTX.
+#include <gtest/gtest.h>
+
+#include <tuple>
+
+#include "tests/cuda/engine_cases.hpp"
+#include "tests/cuda/faulty_runs.hpp"
+#include "tests/cuda/ptx/ptx_machine.hpp"
+
+namespace breccia::cuda {
+namespace {
+
+// While it lives, translations run instead of kernels.
+class Translated {
+ public:
+  Translated(const char* table, const char* arch) {
+    cuda_emulation::substitute_kernels(&cuda_ptx::translations(table, arch));
+  }
+  ~Translated() { cuda_emulation::substitute_kernels(nullptr); }
+  Translated(const Translated&) = delete;
+  Translated& operator=(const Translated&) = delete;
+};
+
+class Ptx : public testing::TestWithParam<std::tuple<const char*, Precision>> {
+ protected:
+  void SetUp() override { cuda_emulation::set_order(Order::kRandom, 5); }
+  [[nodiscard]] const char* arch() const { return std::get<0>(GetParam()); }
+  [[nodiscard]] Precision precision() const { return std::get<1>(GetParam()); }
+  // The code for both is the same so far: one of them runs long.
+  [[nodiscard]] int steps(int most) const { return std::string_view(arch()) == "sm_90" ? most : most / 5; }
+};
+
+void expect_equal_to_host(const Scene& scene, int steps) {
+  const auto host = grid::make_host_engine(setup_for(scene), self());
+  const auto device = make_cuda_engine(setup_for(scene));
+  for (Engine* engine : {host.get(), device.get()}) {
+    fill(*engine, scene);
+    advance(*engine, steps, kStep);
+  }
+  expect_below(compare(device->observe(), host->observe()), scene.numerics.precision);
+  const grid::SignalSpeeds a = device->signal_speeds(), b = host->signal_speeds();
+  const double tolerance = scene.numerics.precision == Precision::kDouble ? kDouble : kMixed;
+  EXPECT_NEAR(a.sound, b.sound, tolerance * b.sound);
+  EXPECT_NEAR(device->passes().viscous_work, host->passes().viscous_work, 10 * tolerance * host->passes().viscous_work);
+  EXPECT_EQ(device->finish_damage(), host->finish_damage());
+}
+
+TEST_P(Ptx, CollisionEqualsHostEngine) {
+  const Translated translated("production", arch());
+  expect_equal_to_host(small_impact(precision()), steps(200));
+}
+
+TEST_P(Ptx, DebrisEqualsHostEngine) {
+  const Translated translated("production", arch());
+  expect_equal_to_host(debris(precision()), steps(20));
+}
+
+TEST_P(Ptx, WallsEqualHostEngine) {
+  const Translated translated("production", arch());
+  Scene scene = small_impact(precision());
+  scene.boundaries = {{{0, -20e3, 0}, {0, 1, 0}, BoundaryKind::kFriction, 0.4},
+                      {{0, 0, -25e3}, {0, 0, 1}, BoundaryKind::kSlip, 0.0}};
+  expect_equal_to_host(scene, steps(25));
+}
+
+// Without fused multiply-adds nvcc and g++ do the same arithmetic: every bit of a state after a sorting is the same.
+TEST_P(Ptx, BitsAreThoseOfTheHostCompiler) {
+  for (const Scene& scene : {small_impact(precision()), debris(precision())}) {
+    std::vector<EngineState> states;
+    const auto run = [&] {
+      const auto engine = make_cuda_engine(setup_for(scene));
+      fill(*engine, scene);
+      advance(*engine, steps(15), kStep);
+      engine->gather(kStep);
+      engine->sort();
+      states.push_back(engine->save());
+    };
+    run();
+    {
+      const Translated translated("unfused", arch());
+      run();
+    }
+    EXPECT_EQ(states[1].node, states[0].node);
+    for (std::size_t c = 0; c < states[0].columns.size(); ++c) {
+      EXPECT_EQ(states[1].columns[c].values, states[0].columns[c].values) << states[0].columns[c].name;
+    }
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(All, Ptx,
+                         testing::Combine(testing::Values("sm_80", "sm_90"),
+                                          testing::Values(Precision::kMixed, Precision::kDouble)),
+                         [](const auto& p) {
+                           return std::string(std::get<0>(p.param)) +
+                                  (std::get<1>(p.param) == Precision::kMixed ? "_mixed" : "_double");
+                         });
+
+// Mistakes in what nvcc emits are found at the access or barrier.
+class PtxFaults : public testing::Test {
+ protected:
+  const Translated translated_{"faulty", "sm_90"};
+};
+using namespace cuda_test;
+
+TEST_F(PtxFaults, RightKernelIsRight) {
+  for (const Order order : {Order::kForward, Order::kReverse, Order::kRandom})
+    EXPECT_EQ(run<Fault::kNone>(order), kSum);
+}
+TEST_F(PtxFaults, MissingBarrierShowsAsUninitialisedMemory) {
+  EXPECT_NE(run<Fault::kNoBarrier>(Order::kForward), kSum);
+}
+TEST_F(PtxFaults, EarlyExitBeforeABarrier) {
+  EXPECT_TRUE(says(error_of<Fault::kEarlyExit>(), "thread 5: left before the barrier of line"));
+}
+TEST_F(PtxFaults, DifferentBarriers) {
+  EXPECT_TRUE(says(error_of<Fault::kDivergentBarrier>(), "waits at the barrier of line"));
+}
+TEST_F(PtxFaults, ShuffleWithLanesThatNeverCome) {
+  EXPECT_TRUE(says(error_of<Fault::kLostLane>(), "before the warp function"));
+}
+TEST_F(PtxFaults, SharedMemoryOverrun) {
+  EXPECT_TRUE(says(error_of<Fault::kOverrun>(), "shared access out of range or not aligned: 4 bytes at 260 of 260"))
+      << error_of<Fault::kOverrun>();
+}
+TEST_F(PtxFaults, GlobalMemoryOverrun) {
+  EXPECT_TRUE(says(error_of<Fault::kGlobalOverrun>(), "global access out of range"));
+}
+TEST_F(PtxFaults, KernelWithoutTranslation) { EXPECT_TRUE(says(error_of<Fault::kNoAtomic>(), "has no translation")); }
+
+}  // namespace
+}  // namespace breccia::cuda
