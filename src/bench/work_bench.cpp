@@ -20,8 +20,8 @@ namespace {
 struct WorkState {
   const char* name;
   EngineCase matter;
-  double damage;          // of all particles
-  double spread;          // positions times this: 1 as they are, large for particles that are alone
+  double damage;  // of all particles
+  double spread;  // positions times this: 1 as they are, large for particles that are alone
   bool lone_without_grid;
 };
 

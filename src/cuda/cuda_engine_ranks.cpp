@@ -13,8 +13,8 @@ namespace {
 using mpi::get;
 using mpi::put;
 
-// Work of a step [ps]. A warp of particles at 5e9 a second (docs/gpu.md); copying a tile's nodes and updating them moves
-// as many bytes as 48 particles. Counted from instructions and bytes, not measured on a device.
+// Work of a step [ps]. A warp of particles at 5e9 a second (docs/gpu.md); copying a tile's nodes and updating them
+// moves as many bytes as 48 particles. Counted from instructions and bytes, not measured on a device.
 constexpr std::size_t kWarp = 32;
 constexpr std::uint64_t kWarpWork = 6400;
 constexpr std::uint64_t kTileWork = 9600;
