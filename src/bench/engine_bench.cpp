@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "bench/cpu_time.hpp"
@@ -139,6 +140,7 @@ void run_engine_bench(const EngineBenchOptions& options) {
   if (engine.device != "host") cores = {1};
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
   const io::Machine machine = io::this_machine();
+  std::map<std::string, double> plain_rates;
   std::FILE* table = options.json == "-" ? stderr : stdout;
   if (comm.is_root()) {
     if (engine.device != "host") fmt::print(table, "device: {}; ", engine.reason);
@@ -153,8 +155,14 @@ void run_engine_bench(const EngineBenchOptions& options) {
       for (const int threads : cores) {
         const Measured m = measure(row, precision, threads, options.seconds, comm, engine.make);
         if (!comm.is_root()) continue;
-        fmt::print(table, "{:<10} {:<20} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}\n", row.state.name, row.name(),
-                   name_of(precision), threads * comm.size(), 1e-6 * m.rate, 1e-6 * m.wall_rate, m.bytes_per_particle);
+        // Of the same state, precision and cores without it: measured before.
+        double& plain =
+            plain_rates[fmt::format("{} {} {} {}", row.state.name, row.effects.name, name_of(precision), threads)];
+        const double price = row.reproducible && plain > 0.0 ? 100.0 * (plain / m.wall_rate - 1.0) : 0.0;
+        if (!row.reproducible) plain = m.wall_rate;
+        fmt::print(table, "{:<10} {:<20} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}{}\n", row.state.name, row.name(),
+                   name_of(precision), threads * comm.size(), 1e-6 * m.rate, 1e-6 * m.wall_rate, m.bytes_per_particle,
+                   row.reproducible ? fmt::format("  price {:.1f} % of wall time", price) : "");
         std::fflush(table);
         results.push_back({{"case", row.state.name},
                            {"precision", name_of(precision)},
