@@ -13,7 +13,7 @@
 namespace breccia::sim::test {
 namespace {
 
-constexpr std::uint64_t kCheckpoint = 8, kEnd = 32;
+constexpr std::uint64_t kCheckpoint = 8, kEnd = 16;
 
 // A file of rank 0 that all ranks see.
 class SharedFile {
