@@ -176,7 +176,7 @@ TEST(ReproducibleRestart, OnAnotherNumberOfRanks) {
     TimeLoop loop(scene, resolve_effects(scene), 1, world);
     loop.run([](const TimeLoop&) { return true; },
              [&](const TimeLoop& now) {
-               if (now.step() != kCheckpoint) return true;
+               if (now.step() < kCheckpoint) return true;
                at_checkpoint = now.state();
                io::write_checkpoint(file, {now.engine().save(), "{}"}, world);
                return false;
