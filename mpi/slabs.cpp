@@ -24,8 +24,8 @@ struct Row {
 
   // The furthest end of a slab from `first` with at most `limit`.
   [[nodiscard]] std::size_t furthest(std::size_t first, std::uint64_t limit) const {
-    const auto end = std::upper_bound(before.begin() + static_cast<std::ptrdiff_t>(first), before.end(),
-                                      before[first] + limit);
+    const auto end =
+        std::upper_bound(before.begin() + static_cast<std::ptrdiff_t>(first), before.end(), before[first] + limit);
     return static_cast<std::size_t>(end - before.begin()) - 1;
   }
   // The earliest begin of a slab up to `last` with at most `limit`.

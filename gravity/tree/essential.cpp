@@ -65,7 +65,7 @@ class Opener {
         stack_.pop_back();
         const Cell& source = sources_.cell(s);
         if (leaf != nullptr) {
-          if (may_be_opened(source, target, leaf->reach, allowed)) open(s);
+          if (may_be_opened(source, target, *leaf, allowed)) open(s);
         } else if (expandable(source, target, allowed)) {
           continue;
         } else if (!source.is_leaf() && source.radius >= target.radius) {
@@ -86,11 +86,11 @@ class Opener {
 
   // Whether any target in a leaf of the top may open the source. Of those inside, with centre T and radius R,
   // |T - centre| + R <= reach: their particles are at least D - reach away, and so is T by R more.
-  [[nodiscard]] static bool may_be_opened(const Cell& source, const Cell& leaf, double reach, double allowed) {
+  [[nodiscard]] static bool may_be_opened(const Cell& source, const Cell& leaf, const TopLeaf& top, double allowed) {
     if (source.count <= kFewParticles) return true;
-    if (leaf.count <= kSparseGroupParticles) return opening(source, leaf, allowed) == Opening::kOpen;
+    if (leaf.count <= kGroupParticles && !top.may_be_divided) return opening(source, leaf, allowed) == Opening::kOpen;
     const Vec3d d = leaf.centre - source.centre;
-    const double nearest = (1.0 - 1e-9) * (std::sqrt(dot(d, d)) - reach);
+    const double nearest = (1.0 - 1e-9) * (std::sqrt(dot(d, d)) - top.reach);
     const double b = source.radius;
     if (nearest <= b / kLargestOpening) return true;
     using detail::square;

@@ -152,9 +152,11 @@ void decide_for(const OpeningTask& task) {
     if constexpr (kGroup) {
       opening_number(g).store(number);
     } else {
-      select(expandable(g), V(static_cast<double>(Opening::kExpand)), V(static_cast<double>(Opening::kOpen))).store(number);
+      select(expandable(g), V(static_cast<double>(Opening::kExpand)), V(static_cast<double>(Opening::kOpen)))
+          .store(number);
     }
-    for (std::int64_t lane = 0; lane < count; ++lane) task.how[k + lane] = static_cast<Opening>(static_cast<int>(number[lane]));
+    for (std::int64_t lane = 0; lane < count; ++lane)
+      task.how[k + lane] = static_cast<Opening>(static_cast<int>(number[lane]));
   }
 }
 

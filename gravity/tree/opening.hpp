@@ -21,6 +21,18 @@ inline constexpr double kOctupole = 0.1;
 /// A cell of so few particles costs less as particles.
 inline constexpr std::int64_t kFewParticles = 2;
 
+/// A group is sparse, and divided, if something larger near it is denser by this factor.
+inline constexpr double kDenser = 64.0;
+
+namespace detail {
+BRECCIA_HD double cube(double x) { return x * x * x; }
+}  // namespace detail
+
+/// Mass over the cube of the radius; a single particle has none to speak of.
+BRECCIA_HD double density(const Cell& cell) {
+  return cell.radius > 0.0 ? cell.moments.mass / detail::cube(cell.radius) : 0.0;
+}
+
 enum class Opening : std::uint8_t {
   kOpen,    ///< its children, or its particles
   kWhole,   ///< monopole and quadrupole at each target
@@ -69,8 +81,8 @@ BRECCIA_HD auto expandable(const OpeningGeometry<T>& g) {
 /// nobody could predict them.
 template <class T>
 BRECCIA_HD T opening_number(const OpeningGeometry<T>& g) {
-  using std::sqrt;
   using detail::square;
+  using std::sqrt;
   const T b = g.source_radius;
   const T distance = sqrt(g.distance_squared);
   const T nearest = distance - g.target_radius;

@@ -4,6 +4,7 @@
 #include <array>
 #include <cmath>
 
+#include "gravity/tree/opening.hpp"
 #include "gravity/tree/scales.hpp"
 
 namespace breccia::gravity {
@@ -141,7 +142,7 @@ void SharedTree::list_leaves() {
     const std::int32_t i = stack.back();
     stack.pop_back();
     const Cell& c = tree_.cell(i);
-    if (c.children == 0) leaves_.push_back({i, top_[static_cast<std::size_t>(i)].owner, 0.0});
+    if (c.children == 0) leaves_.push_back({i, top_[static_cast<std::size_t>(i)].owner, false, 0.0});
     for (std::int32_t k = c.children; k-- > 0;) stack.push_back(c.first_child + k);
   }
 }
@@ -292,24 +293,36 @@ double SharedTree::reach_of(const Cell& leaf) const {
   return reach;
 }
 
-void SharedTree::set_scales(std::span<const Cell> others, double softening) {
+double SharedTree::largest_density() const {
+  double largest = 0.0;
+  for (const Cell& c : tree_.cells) {
+    if (c.count > kSparseGroupParticles) largest = std::max(largest, density(c));
+  }
+  return comm_.max(largest);
+}
+
+void SharedTree::set_scales(std::span<const Cell> others, double softening, double densest) {
   scales_ = acceleration_scales(tree_, others, softening, threads_);
   if (comm_.size() == 1) return;
   struct LeafScale {
     std::int64_t number;
     double scale, reach;
+    bool may_be_divided;
   };
   std::vector<LeafScale> mine;
   for (std::size_t l = 0; l < leaves_.size(); ++l) {
     if (leaves_[l].owner != comm_.rank()) continue;
     const std::int32_t cell = leaves_[l].cell;
-    mine.push_back({static_cast<std::int64_t>(l), scales_[static_cast<std::size_t>(cell)], reach_of(tree_.cell(cell))});
+    const Cell& leaf = tree_.cell(cell);
+    mine.push_back({static_cast<std::int64_t>(l), scales_[static_cast<std::size_t>(cell)], reach_of(leaf),
+                    leaf.is_group() && !leaf.is_smallest_group() && kDenser * density(leaf) <= densest});
   }
   bytes_sent_ += static_cast<double>(mine.size() * sizeof(LeafScale)) * (comm_.size() - 1);
   for (const LeafScale& s : comm_.allgather_arrays(std::span<const LeafScale>(mine))) {
     TopLeaf& leaf = leaves_[static_cast<std::size_t>(s.number)];
     scales_[static_cast<std::size_t>(leaf.cell)] = s.scale;
     leaf.reach = s.reach;
+    leaf.may_be_divided = s.may_be_divided;
   }
   take_least_of_children(tree_, top_.size(), scales_);
 }

@@ -16,7 +16,8 @@ namespace breccia::gravity {
 struct TopLeaf {
   std::int32_t cell;
   std::int32_t owner;
-  double reach;  ///< no group or larger target inside sticks out farther from its centre, |T - centre| + R_T
+  bool may_be_divided;  ///< a single group that may be sparse (opening.hpp)
+  double reach;         ///< no group or larger target inside sticks out farther from its centre, |T - centre| + R_T
 };
 
 /// The top holds the largest cells, some ten thousand, and those that hold particles of several ranks down to single
@@ -35,8 +36,10 @@ class SharedTree {
   /// Builds the tree. All cells know their moments; those below the leaves of other ranks are not there. Collective.
   void build(const Root& root, ParticlesView particles, double mass_unit);
 
-  /// Weighs the cells by acceleration_scales(). Collective.
-  void set_scales(std::span<const Cell> others, double softening);
+  /// Weighs the cells by acceleration_scales(). `densest`: the largest density() of what pulls them. Collective.
+  void set_scales(std::span<const Cell> others, double softening, double densest);
+  /// The largest density() of a cell that holds more than some group. Collective.
+  [[nodiscard]] double largest_density() const;
 
   [[nodiscard]] const Tree& tree() const { return tree_; }
   [[nodiscard]] Tree& tree() { return tree_; }
@@ -78,6 +81,7 @@ class SharedTree {
   void share_moments();
   void enclose_top();
   [[nodiscard]] double reach_of(const Cell& leaf) const;
+
   [[nodiscard]] FieldSums bring_home(const FieldSums& sums, std::vector<std::int64_t>& index);
 
   mpi::Comm comm_;

@@ -67,12 +67,14 @@ void UnsplitField::grow_trees(ParticlesView particles, double mass_unit, bool wi
 }
 
 void UnsplitField::weigh_cells() {
+  double densest = 0.0;
+  for (const Set& s : sets_) densest = std::max(densest, s.tree->largest_density());
   for (Set& s : sets_) {
     std::vector<Cell> others;
     for (const Set& other : sets_) {
       if (&other != &s && !other.tree->tree().cells.empty()) others.push_back(other.tree->tree().cell(0));
     }
-    s.tree->set_scales(others, parameters_.softening / root_.unit);
+    s.tree->set_scales(others, parameters_.softening / root_.unit, densest);
   }
 }
 

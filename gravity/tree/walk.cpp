@@ -135,13 +135,11 @@ class Walker {
 
   // Whether the group is to be divided: something larger near it is denser by far.
   [[nodiscard]] bool is_sparse(const Walking<Real>& w, const Cell& group, Candidates from) const {
-    constexpr double kDenser = 64.0;
     if (group.is_smallest_group()) return false;
-    const auto cube = [](double x) { return x * x * x; };
-    const double density = kDenser * group.moments.mass / cube(group.radius);
+    const double limit = kDenser * density(group);
     for (std::size_t k = from.begin; k < from.end; ++k) {
       const Cell& source = sources_.cell(w.candidates[k]);
-      if (source.count > group.count && source.moments.mass > density * cube(source.radius)) return true;
+      if (source.count > group.count && density(source) > limit) return true;
     }
     return false;
   }

@@ -46,8 +46,8 @@ void run_message_bench(const MessageBenchOptions& options) {
   comm.barrier();
   if (!comm.is_root()) return;
   const double bandwidth = static_cast<double>(kLarge) / (large - latency);
-  fmt::print(options.json == "-" ? stderr : stdout, "latency {:.2f} us, bandwidth {:.2f} GB/s each way\n", 1e6 * latency,
-             1e-9 * bandwidth);
+  fmt::print(options.json == "-" ? stderr : stdout, "latency {:.2f} us, bandwidth {:.2f} GB/s each way\n",
+             1e6 * latency, 1e-9 * bandwidth);
   write_json({{"latency", latency}, {"bandwidth", bandwidth}}, options.json);
 }
 

@@ -8,8 +8,8 @@
 
 namespace breccia::io {
 
-/// Reads all of the HDF5 file `path` in a child process first. Throws IoError if that crashes or does not come to an end.
-/// What is merely not as expected is left to the reader. Needs no MPI.
+/// Reads all of the HDF5 file `path` in a child process first. Throws IoError if that crashes or does not come to an
+/// end. What is merely not as expected is left to the reader. Needs no MPI.
 void require_harmless(const std::filesystem::path& path);
 
 /// The same by a child of the root, with the same outcome on all ranks. Collective.

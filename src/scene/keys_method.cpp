@@ -229,12 +229,14 @@ std::vector<Key> parallel() {
        {"x", "y", "z", "auto"},
        "",
        "",
-       "axis that slabs cut across; auto: the longest of the matter where particles are first shared out. A restart may "
+       "axis that slabs cut across; auto: the longest of the matter where particles are first shared out. A restart "
+       "may "
        "change it",
        [](Draft& d, std::size_t) -> Slot {
          std::optional<int>& axis = d.scene.parallel.axis;
-         return ChoiceSlot{[&axis] { return std::optional(static_cast<std::size_t>(axis.value_or(3))); },
-                           [&axis](std::size_t i) { axis = i < 3 ? std::optional(static_cast<int>(i)) : std::nullopt; }};
+         return ChoiceSlot{
+             [&axis] { return std::optional(static_cast<std::size_t>(axis.value_or(3))); },
+             [&axis](std::size_t i) { axis = i < 3 ? std::optional(static_cast<int>(i)) : std::nullopt; }};
        }},
   };
 }

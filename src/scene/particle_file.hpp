@@ -25,8 +25,8 @@ struct ParticleFileSlice {
   std::vector<double> damage;   ///< empty if the file has none
 };
 
-/// Reads and checks the whole file, first in a child process. Throws IoError if it cannot be read or crashes HDF5, UsageError if numbers are not finite, masses
-/// are not positive or there are no particles.
+/// Reads and checks the whole file, first in a child process. Throws IoError if it cannot be read or crashes HDF5,
+/// UsageError if numbers are not finite, masses are not positive or there are no particles.
 ParticleFileSummary summarize_particle_file(const std::string& path);
 
 /// Particles begin .. begin+count-1 in the order of the file. Throws IoError.

@@ -21,6 +21,7 @@ const std::map<std::string_view, std::string_view> kSections{
     {"effects", "[effects]"},
     {"gravity", "[gravity]"},
     {"numerics", "[numerics]"},
+    {"parallel", "[parallel]"},
     {"output", "[output]"},
 };
 const std::map<std::string_view, std::string_view> kNotes{

@@ -6,8 +6,8 @@ namespace breccia::sim {
 namespace {
 
 // Time of one evaluation on a core of a Xeon with AVX-512, mixed precision, by what its Solver::work() counts [ps]
-// (breccia_bench work, phases of --profile). The transforms of the mesh are not in it: ranks share them by planes of the
-// mesh, wherever the particles are.
+// (breccia_bench work, phases of --profile). The transforms of the mesh are not in it: ranks share them by planes of
+// the mesh, wherever the particles are.
 struct GravityWeights {
   double unit;      ///< of the work, a pair of particles
   double particle;  ///< besides, for each particle: sorting, moments, assignment

@@ -12,8 +12,8 @@
 
 namespace breccia::sim {
 
-/// What gravity costs of each of this rank's particles in a step [ps], by the counts of the last evaluation, one for each
-/// `interval` steps; in the order of Engine::predict().
+/// What gravity costs of each of this rank's particles in a step [ps], by the counts of the last evaluation, one for
+/// each `interval` steps; in the order of Engine::predict().
 std::vector<double> gravity_work(const gravity::Solver& solver, int interval);
 
 /// Keeps the work of the ranks even, and a record of how even it was.

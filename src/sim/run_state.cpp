@@ -156,8 +156,8 @@ OutputState output_from(const Json& json) {
 
 // Keys that neither the particles nor their fields depend on. Those that end in '.' stand for all below.
 constexpr std::array<std::string_view, 12> kHarmless{
-    "output.", "parallel.",          "numerics.energy_gain", "scene.name",   "scene.end",     "time.cfl",     "effects.gravity",
-    "gravity.interval", "gravity.opening",      "gravity.mesh", "gravity.split", "gravity.error"};
+    "output.",         "parallel.",        "numerics.energy_gain", "scene.name",   "scene.end",     "time.cfl",
+    "effects.gravity", "gravity.interval", "gravity.opening",      "gravity.mesh", "gravity.split", "gravity.error"};
 
 bool harmless(const std::string& key) {
   return std::ranges::any_of(kHarmless,

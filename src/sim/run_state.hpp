@@ -20,13 +20,13 @@ struct LostWork {
   std::uint64_t clamped = 0;  ///< volume changes that were cut (PassReport::clamped)
 };
 
-/// Of the balance of loads, since the start or since the number of ranks changed. Imbalance is the largest over the mean
-/// counted work of the ranks.
+/// Of the balance of loads, since the start or since the number of ranks changed. Imbalance is the largest over the
+/// mean counted work of the ranks.
 struct BalanceState {
-  std::uint64_t windows = 0;    ///< at whose start work was counted
-  std::uint64_t recuts = 0;     ///< times that slabs were cut anew
-  double imbalance = 1.0;       ///< in the last window
-  double imbalance_sum = 0.0;   ///< of all windows
+  std::uint64_t windows = 0;   ///< at whose start work was counted
+  std::uint64_t recuts = 0;    ///< times that slabs were cut anew
+  double imbalance = 1.0;      ///< in the last window
+  double imbalance_sum = 0.0;  ///< of all windows
   double imbalance_max = 1.0;
 };
 

@@ -35,6 +35,7 @@ void run(int sortings) {
   grid::EngineSetup setup;
   setup.cell = 1000.0;
   setup.materials.resize(1);
+  setup.self_gravity = true;
   setup.uniform_gravity = {0.0, 0.0, -1.0};
   setup.numerics.precision = sizeof(typename P::Real) == 8 ? Precision::kDouble : Precision::kMixed;
   const ParticleArrays all = particles(setup.cell);
@@ -44,6 +45,9 @@ void run(int sortings) {
   cuda::CudaEngine<P> engine(setup, mpi::Comm(MPI_COMM_SELF));
   const std::vector<Vec3d> spin(1);
   engine.insert(all, flaws, spin);
+  for (const GravityMethod method : {GravityMethod::kDirect, GravityMethod::kTree}) {
+    engine.make_resident_solver(method, {.precision = setup.numerics.precision})->evaluate_and_hold(1.0);
+  }
   constexpr double step = 0.02;
   engine.scatter(0.5 * step);
   for (int n = 0; n < sortings; ++n) {

@@ -44,7 +44,7 @@ Walked walked(const Cloud& cloud, const std::function<bool(std::size_t)>& is_min
   const Root root = random_root(-far, far);
   SharedTree tree(comm, 1, top_leaves);
   tree.build(root, {mine.position, mine.mass}, 3e13);
-  tree.set_scales({}, 125.0 / root.unit);
+  tree.set_scales({}, 125.0 / root.unit, tree.largest_density());
   Walked result;
   const SharedTree* targets[1] = {&tree};
   result.imported = import_essential(tree, targets, kTolerance, comm);

@@ -15,7 +15,8 @@ std::uint64_t largest(const std::vector<std::uint64_t>& shares) { return *std::r
 
 // The least maximum over all ways to cut, found by trying them.
 std::uint64_t least_maximum(const std::vector<std::uint64_t>& work, std::size_t first, int ranks) {
-  if (ranks == 1) return std::accumulate(work.begin() + static_cast<std::ptrdiff_t>(first), work.end(), std::uint64_t{});
+  if (ranks == 1)
+    return std::accumulate(work.begin() + static_cast<std::ptrdiff_t>(first), work.end(), std::uint64_t{});
   std::uint64_t best = std::numeric_limits<std::uint64_t>::max();
   std::uint64_t own = 0;
   for (std::size_t cut = first; cut <= work.size(); ++cut) {

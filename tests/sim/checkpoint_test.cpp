@@ -109,8 +109,8 @@ void expect_same_bits(const Outcome& one, const Outcome& other) {
   EXPECT_EQ(one.lost.viscous, other.lost.viscous);
 }
 
-// Sums of a node run in another order: rounding, which contact amplifies a little (ranks_test.cpp has the same bound); a
-// particle that is lost or has a neighbour's flaws shows as 1e-6 and more.
+// Sums of a node run in another order: rounding, which contact amplifies a little (ranks_test.cpp has the same bound);
+// a particle that is lost or has a neighbour's flaws shows as 1e-6 and more.
 void expect_near(const Outcome& one, const Outcome& other) {
   constexpr double kTolerance = 1e-12;
   ASSERT_EQ(one.end.size(), other.end.size());
@@ -271,8 +271,8 @@ TEST(Checkpoint, OtherAxisOfSlabs) {
   const Scene scene = load(collision(9e3), {"gravity.interval=8"});
   const Outcome whole = run_through(scene, file.path(), comm);
   const Scene across = load(collision(9e3), {"gravity.interval=8", "parallel.axis=z"});
-  EXPECT_EQ(TimeLoop(across, resolve_effects(across), io::read_checkpoint(file.path(), comm).engine, whole.at_checkpoint,
-                     1, comm)
+  EXPECT_EQ(TimeLoop(across, resolve_effects(across), io::read_checkpoint(file.path(), comm).engine,
+                     whole.at_checkpoint, 1, comm)
                 .engine()
                 .slabs()
                 .axis(),

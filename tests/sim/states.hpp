@@ -34,7 +34,8 @@ inline State gather(const ParticleOutput& p, const mpi::Comm& comm) {
 
 /// States of all particles, every 20 steps for 200; the same on all ranks. `visit` sees each t_n besides.
 inline std::vector<State> history(
-    const Scene& scene, const mpi::Comm& comm, const std::function<void(const TimeLoop&)>& visit = [](const TimeLoop&) {}) {
+    const Scene& scene, const mpi::Comm& comm,
+    const std::function<void(const TimeLoop&)>& visit = [](const TimeLoop&) {}) {
   constexpr std::uint64_t kSteps = 200, kEvery = 20;
   std::vector<State> states;
   simulate(

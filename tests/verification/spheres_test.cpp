@@ -87,7 +87,8 @@ double flattening(double spin_over_limit, int cells_per_radius) {
   const double limit = std::sqrt(ms / (1.0 + 2.0 * ms / 3.0) * 4.0 / 3.0 * kPi * kNewton * kDensity);
   char spin[60];
   std::snprintf(spin, sizeof spin, "spin = [0, 0, \"%.10g rad/s\"]\n", spin_over_limit * limit);
-  const Scene scene = load(sphere(cells_per_radius, std::string("damage = 1\n") + spin, "[effects]\ngravity = \"direct\"\n"));
+  const Scene scene =
+      load(sphere(cells_per_radius, std::string("damage = 1\n") + spin, "[effects]\ngravity = \"direct\"\n"));
   double ratio = 0.0;
   simulate(scene, [&](const TimeLoop& loop) {
     if (loop.time() < 6000.0) return true;

@@ -1,7 +1,7 @@
 """Performance model: the time of a step on many ranks from particles, halo area, latency, bandwidth and gravity mesh.
 
-Two equal spheres that touch, cut across the line of their centres into slabs on planes of blocks of four cells: the matter
-of the flagship impact. Cells are the unit of length, seconds that of time. docs/scaling.md explains the terms.
+Two equal spheres that touch at 15 degrees, cut into slabs on planes of blocks of four cells: the matter of the flagship
+impact. Cells are the unit of length, seconds that of time. docs/scaling.md explains the terms.
 """
 
 import dataclasses
@@ -11,6 +11,8 @@ BLOCK = 4  # cells along an edge of a block
 CHANNELS = 8  # values of a node that travel
 HALO_PLANES = 2  # planes of nodes that a rank reaches behind a cut
 MARGIN = 2  # cells that a tile reaches beyond its particles
+HALO_MARGIN = MARGIN + 0.5 * BLOCK  # and whole blocks travel
+TILE = 21.6  # particles that cost as much as a tile does by itself, on a host core (breccia_bench work)
 # Share of a padded mesh that a transposition moves: halves that are zero stay where they are. From the bytes that four
 # ranks sent (docs/performance.md): 12.9 MB an evaluation at 1e6 particles.
 TRANSPOSED = 0.4
@@ -41,6 +43,7 @@ class Case:
     per_cell: float = 1.412  # particles in a cell
     interval: int = 32  # steps between evaluations of gravity; 0: no gravity
     mesh_cell: float = 1.16  # mesh cell in grid cells: 1.3 mean distances of particles
+    angle: float = math.radians(15.0)  # of the line of centres with the axis that slabs cut across
 
     @property
     def radius(self):
@@ -51,7 +54,8 @@ class Case:
 def plane_cells(case):
     """Cells of matter in each plane of blocks across both spheres, from one end to the other."""
     radius = case.radius
-    planes = max(1, math.ceil(4.0 * radius / BLOCK))
+    apart = 2.0 * radius * math.cos(case.angle)
+    planes = max(1, math.ceil((apart + 2.0 * radius) / BLOCK))
 
     def below(x):
         """Volume of both spheres up to x."""
@@ -60,16 +64,33 @@ def plane_cells(case):
             h = min(max(h, 0.0), 2.0 * radius)
             return math.pi * h * h * (radius - h / 3.0)
 
-        return cap(x) + cap(x - 2.0 * radius)
+        return cap(x) + cap(x - apart)
 
     return [below(BLOCK * (p + 1)) - below(BLOCK * p) for p in range(planes)]
 
 
-def section(case, x):
-    """Cells of a cut through the spheres at x cells from the end, with what tiles reach beyond."""
+def union_of_discs(a, b, apart):
+    """Area of two discs with radii a and b whose centres are so far apart; a radius of 0 is no disc."""
+    if min(a, b) <= 0.0 or apart >= a + b:
+        return math.pi * (a * a + b * b)
+    if apart <= abs(a - b):
+        return math.pi * max(a, b) ** 2
+    at = (apart**2 + a**2 - b**2) / (2.0 * apart)  # of the common chord, from the first centre
+    lens = (a**2 * math.acos(at / a) + b**2 * math.acos((apart - at) / b)
+            - apart * math.sqrt(max(0.0, a**2 - at**2)))
+    return math.pi * (a * a + b * b) - lens
+
+
+def section(case, x, margin):
+    """Cells of a cut through the spheres at x cells from the end, with a margin around them [cells]."""
     radius = case.radius
-    square = max(0.0, radius**2 - (x % (2.0 * radius) - radius) ** 2)
-    return math.pi * (math.sqrt(square) + MARGIN + 0.5 * BLOCK) ** 2
+
+    def disc(centre):
+        square = radius**2 - (x - centre) ** 2
+        return math.sqrt(square) + margin if square > 0.0 else 0.0
+
+    apart = 2.0 * radius
+    return union_of_discs(disc(radius), disc(radius + apart * math.cos(case.angle)), apart * math.sin(case.angle))
 
 
 def cuts(work, ranks):
@@ -100,7 +121,7 @@ def halo_bytes(case, at, word):
     """Bytes that a rank sends in a step across a cut at plane `at`: sums of the nodes that its particles reach there, and
     velocities of its own that particles there reach."""
     x = BLOCK * at
-    below, above = (max(section(case, x), section(case, x + side * MARGIN)) for side in (-1, 1))
+    below, above = (max(section(case, x + reach, HALO_MARGIN) for reach in (0, side * MARGIN)) for side in (-1, 1))
     return HALO_PLANES * (below + above) * CHANNELS * word
 
 
@@ -146,7 +167,7 @@ def step(case, machine, ranks):
     """The step of `case` on `ranks` ranks."""
     cells = plane_cells(case)
     # Engine work of a plane: particles, and its blocks.
-    blocks = [section(case, BLOCK * (p + 0.5)) / BLOCK**2 for p in range(len(cells))]
+    blocks = [section(case, BLOCK * (p + 0.5), 0.5 * BLOCK) / BLOCK**2 for p in range(len(cells))]
     work = [machine.particle * case.per_cell * c + machine.tile * b for c, b in zip(cells, blocks)]
     near = [machine.gravity_particle * case.per_cell * c for c in cells]
     if case.interval:
@@ -202,12 +223,14 @@ def fit(runs, network, name="this machine", word=4):
     rows, values = [], []
     for run in runs:
         case = Case(run["particles"], run["per_cell"])
-        blocks = sum(section(case, BLOCK * (p + 0.5)) / BLOCK**2 for p in range(len(plane_cells(case))))
+        blocks = sum(section(case, BLOCK * (p + 0.5), 0.5 * BLOCK) / BLOCK**2 for p in range(len(plane_cells(case))))
         rows.append([run["particles"], blocks])
         values.append(run["engine"])
-    particle, tile = least_squares(rows, values)
-    if tile < 0.0:  # noise: the sizes differ too little
-        particle, tile = least_squares([r[:1] for r in rows], values)[0], 0.0
+    if len({run["particles"] for run in runs}) > 1:
+        particle, tile = least_squares(rows, values)
+    else:
+        particle = least_squares([[n + TILE * tiles] for n, tiles in rows], values)[0]
+        tile = TILE * particle
     near = [r["gravity_near"] / r["particles"] for r in runs if r.get("gravity_near")]
     mesh = []
     for run in runs:
