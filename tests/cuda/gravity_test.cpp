@@ -130,15 +130,16 @@ Scene crowd(Precision precision) {
 }
 
 // The same tree, the same cells for the same targets, on any number of ranks. Groups on the border between two ranks
-// are summed by both.
+// are summed by both. In mixed precision the host divides a sparse group of this scene, which the device does not: a
+// seventh of the error that both may have.
 TEST_P(CudaGravityTest, TreeEqualsHosts) {
   for (const double softening : {0.0, 500.0}) {
     const Parameters parameters{.softening = softening, .precision = GetParam()};
     const Fields fields = evaluate(crowd(GetParam()), GravityMethod::kTree, parameters, world_);
-    EXPECT_LE(fields.rms, is_double() ? 1e-12 : 3e-6) << softening;
+    EXPECT_LE(fields.rms, is_double() ? 1e-12 : 5e-5) << softening;
     EXPECT_GT(fields.device_stats.cell_interactions, 0.0);
     EXPECT_GT(fields.device_stats.expansions, 0.0);
-    if (world_.size() == 1) {
+    if (world_.size() == 1 && is_double()) {
       EXPECT_EQ(fields.device_stats.pairs, fields.host_stats.pairs);
       EXPECT_EQ(fields.device_stats.cell_interactions, fields.host_stats.cell_interactions);
       EXPECT_EQ(fields.device_stats.expansions, fields.host_stats.expansions);
