@@ -66,7 +66,7 @@ Shape shape_of(const ParticleOutput& p) {
 // Pressure inside 25 km, relative, is what creeps, and the reason is the lattice, not rounding (mixed and double agree
 // to five digits, elastic matter creeps as well): with 1.4 particles per cell some motions of nodes have next to no
 // gradient at the particles, nothing elastic resists them, and weight pulls the body along them at 0.05 mm/s, by 10 m
-// and 15 to 20 % of P in 5e5 s. ASFLIP adds torques at random, 2e-6 rad/s, so that such a body also turns through the
+// and up to 21 % of P in 5e5 s. ASFLIP adds torques at random, 2e-6 rad/s, so that such a body also turns through the
 // grid and rearranges. With 8 per cell both are gone.
 struct RestBounds {
   double pressure;  // relative
