@@ -18,6 +18,7 @@ import tempfile
 import time
 from pathlib import Path
 
+COUNT = 2000
 STEPS = 120
 TIMEOUT = 120  # seconds; a run takes less than one
 MOMENTUM = {"mixed": 3e-6, "double": 1e-11}  # of sum m|v|: rounding of weights, physics of 1e2 steps and 1e2 particles
@@ -247,16 +248,17 @@ def keep(root, scene, wrong, text):
 
 
 def add_options(parser):
-    parser.add_argument("--count", type=int, default=2000, help="number of scenes (2000)")
+    parser.add_argument("--count", type=int, default=COUNT, help=f"number of scenes ({COUNT})")
     parser.add_argument("--first", type=int, default=1, help="seed of the first scene; the others follow (1)")
     parser.add_argument("--no-shrink", action="store_true", help="keep failing scenes as they are")
 
 
 def run(root, options):
     """Summary in words and the number of findings."""
-    count = 50 if getattr(options, "quick", False) else options.count
+    count = 50 if getattr(options, "quick", False) else getattr(options, "count", COUNT)
+    first, no_shrink = getattr(options, "first", 1), getattr(options, "no_shrink", False)
     found = refused = 0
-    for seed in range(options.first, options.first + count):
+    for seed in range(first, first + count):
         scene = Scene(seed)
         wrong = try_scene(root, scene, scene.text)
         if wrong.startswith("refused"):
@@ -264,11 +266,11 @@ def run(root, options):
             print(f"seed {seed}: {wrong}", flush=True)
         elif wrong:
             found += 1
-            text = scene.text if options.no_shrink else shrink(root, scene, wrong)
+            text = scene.text if no_shrink else shrink(root, scene, wrong)
             print(f"seed {seed}: {wrong}: {keep(root, scene, wrong, text)}", flush=True)
     if refused > 0.1 * count:  # the generator would test nothing
         found += 1
-    return f"{count} scenes from seed {options.first}, {refused} refused", found
+    return f"{count} scenes from seed {first}, {refused} refused", found
 
 
 def main():

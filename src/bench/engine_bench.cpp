@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "bench/cpu_time.hpp"
@@ -13,6 +14,7 @@
 #include "breccia/error.hpp"
 #include "breccia/isa.hpp"
 #include "breccia/precision.hpp"
+#include "grid/device.hpp"
 #include "io/machine.hpp"
 #include "sim/setup.hpp"
 
@@ -46,12 +48,13 @@ struct Row {
   [[nodiscard]] std::string name() const { return std::string(effects.name) + (reproducible ? ", reproducible" : ""); }
 };
 
-Measured measure(const Row& row, Precision precision, int threads, double seconds, const mpi::Comm& comm) {
+Measured measure(const Row& row, Precision precision, int threads, double seconds, const mpi::Comm& comm,
+                 grid::EngineMaker make) {
   const EngineCase& c = row.state;
   Scene scene = make_scene(c, row.effects, precision);
   scene.numerics.reproducible = row.reproducible;
   const auto engine =
-      sim::make_loaded_engine(scene, sim::resolve_effects(scene), make_state(c, scene, comm), threads, comm);
+      sim::make_loaded_engine(scene, sim::resolve_effects(scene), make_state(c, scene, comm), threads, comm, make);
   const double dt = *scene.time.step;
   const int interval = scene.numerics.sort_interval;
   engine->scatter(0.5 * dt);
@@ -130,12 +133,17 @@ std::vector<Row> rows(const EngineBenchOptions& options) {
 
 void run_engine_bench(const EngineBenchOptions& options) {
   const std::vector<Row> table_rows = rows(options);
-  const std::vector<int> cores = options.cores.empty() ? std::vector<int>{1, 2} : options.cores;
+  const mpi::Comm comm;
+  const grid::EngineChoice engine =
+      grid::choose_engine(options.device == "cuda" ? grid::Device::kCuda : grid::Device::kHost, comm);
+  std::vector<int> cores = options.cores.empty() ? std::vector<int>{1, 2} : options.cores;
+  if (engine.device != "host") cores = {1};
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
   const io::Machine machine = io::this_machine();
-  const mpi::Comm comm;
+  std::map<std::string, double> plain_rates;
   std::FILE* table = options.json == "-" ? stderr : stdout;
   if (comm.is_root()) {
+    if (engine.device != "host") fmt::print(table, "device: {}; ", engine.reason);
     fmt::print(table, "{}, {}, {}; {} ranks; no gravity, sorting included, best cycle of {} steps\n", machine.cpu_model,
                isa_name(active_isa()), io::library_versions().at(1).second, comm.size(),
                NumericsParameters{}.sort_interval);
@@ -145,17 +153,24 @@ void run_engine_bench(const EngineBenchOptions& options) {
   for (const Row& row : table_rows) {
     for (const Precision precision : chosen_precisions(options.precision)) {
       for (const int threads : cores) {
-        const Measured m = measure(row, precision, threads, options.seconds, comm);
+        const Measured m = measure(row, precision, threads, options.seconds, comm, engine.make);
         if (!comm.is_root()) continue;
-        fmt::print(table, "{:<10} {:<20} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}\n", row.state.name, row.name(),
-                   name_of(precision), threads * comm.size(), 1e-6 * m.rate, 1e-6 * m.wall_rate, m.bytes_per_particle);
+        // Of the same state, precision and cores without it: measured before.
+        double& plain =
+            plain_rates[fmt::format("{} {} {} {}", row.state.name, row.effects.name, name_of(precision), threads)];
+        const double price = row.reproducible && plain > 0.0 ? 100.0 * (plain / m.wall_rate - 1.0) : 0.0;
+        if (!row.reproducible) plain = m.wall_rate;
+        fmt::print(table, "{:<10} {:<20} {:<6} {:>5} {:>24.2f} {:>24.2f} {:>15.0f}{}\n", row.state.name, row.name(),
+                   name_of(precision), threads * comm.size(), 1e-6 * m.rate, 1e-6 * m.wall_rate, m.bytes_per_particle,
+                   row.reproducible ? fmt::format("  price {:.1f} % of wall time", price) : "");
         std::fflush(table);
         results.push_back({{"case", row.state.name},
                            {"precision", name_of(precision)},
                            {"cores", threads * comm.size()},
                            {"ranks", comm.size()},
                            {"effects", row.name()},
-                           {"particle_steps_per_second", threads * comm.size() == 1 ? m.rate : m.wall_rate},
+                           {"particle_steps_per_second",
+                            threads * comm.size() == 1 && engine.device == "host" ? m.rate : m.wall_rate},
                            {"particle_steps_per_cpu_second", m.rate},
                            {"particle_steps_per_wall_second", m.wall_rate},
                            {"bytes_per_particle", m.bytes_per_particle}});
@@ -166,6 +181,8 @@ void run_engine_bench(const EngineBenchOptions& options) {
   const nlohmann::ordered_json document = {{"machine", machine.cpu_model},
                                            {"instruction_set", isa_name(active_isa())},
                                            {"compiler", io::library_versions().at(1).second},
+                                           {"device", engine.device},
+                                           {"device_name", engine.reason},
                                            {"results", results}};
   write_json(document, options.json);
 }

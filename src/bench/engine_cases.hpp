@@ -21,8 +21,8 @@ struct EngineCase {
 
 inline constexpr double kDebrisRadius = 2.0e7;  ///< [m]
 
-/// paper: the paper's baseline. cell8_1e6: well filled cells. debris: after an impact. cell8_1e5 and cell8_1e7: whether
-/// the cost of a particle depends on their number.
+/// paper: the paper's baseline. cell8_1e6: well filled cells. debris: after an impact. cell8_1e4, cell8_1e5 and
+/// cell8_1e7: whether the cost of a particle depends on their number.
 std::span<const EngineCase> engine_cases();
 
 /// The effects of a measurement: all of them, or all but one.

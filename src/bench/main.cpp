@@ -15,12 +15,13 @@ int measure(int argc, char** argv) {
   CLI::App app("Measures the speed of breccia on this machine");
   app.require_subcommand(1);
   breccia::bench::EngineBenchOptions options;
-  CLI::App* engine = app.add_subcommand("engine", "particle-steps per second of the host engine");
+  CLI::App* engine = app.add_subcommand("engine", "particle-steps per second of the engine");
   engine->add_flag("--quick", options.quick, "the paper's state with all effects only, half a minute");
-  engine->add_option("--case", options.cases, "paper, debris, cell8_1e5, cell8_1e6, cell8_1e7");
+  engine->add_option("--case", options.cases, "paper, debris, cell8_1e4, cell8_1e5, cell8_1e6, cell8_1e7");
   engine->add_option("--effects", options.effects, "all, or one of those 'no ...'");
   engine->add_option("--precision", options.precision, "mixed or double")->check(CLI::IsMember({"mixed", "double"}));
   engine->add_option("--cores", options.cores, "numbers of threads")->check(CLI::PositiveNumber);
+  engine->add_option("--device", options.device, "host or cuda")->check(CLI::IsMember({"host", "cuda"}));
   engine->add_option("--seconds", options.seconds, "least time of a measurement")->capture_default_str();
   engine->add_flag("--reproducible", options.reproducible, "each state also with numerics.reproducible: its price");
   engine->add_option("--json", options.json, "file for the results, - for standard output");

@@ -58,10 +58,10 @@ std::unique_ptr<grid::Engine> make_engine(const WorkState& state, Precision prec
   scene.numerics.lone_without_grid = state.lone_without_grid;
   scene.effects.damage = Switch::kOn;
   for (BodyParameters& body : scene.bodies) body.damage = state.damage;
-  ParticleArrays particles = make_state(state.matter, scene);
+  const mpi::Comm self(MPI_COMM_SELF);
+  ParticleArrays particles = make_state(state.matter, scene, self);
   for (Vec3d& x : particles.position) x = state.spread * x;
   dt = *scene.time.step;
-  const mpi::Comm self(MPI_COMM_SELF);
   return sim::make_loaded_engine(scene, sim::resolve_effects(scene), particles, 1, self);
 }
 

@@ -81,7 +81,14 @@ NodeArguments<typename P::Real> CudaEngine<P>::node_arguments(double kick) const
 }
 
 template <class P>
-void CudaEngine<P>::launch_pass(const PassArguments<Real>& arguments) {
+void CudaEngine<P>::launch_pass(PassArguments<Real> arguments) {
+  // First the tiles that other ranks wait for: their sums travel beside the rest of the pass.
+  if (arguments.scatter && halo_.active()) {
+    arguments.only = halo_.boundary();
+    launch_tile_pass(arguments, stream_);
+    halo_.send(grid_.view(), stream_);
+    arguments.only = halo_.interior();
+  }
   launch_tile_pass(arguments, stream_);
   launch_lone_pass(arguments, stream_);
 }
@@ -119,7 +126,7 @@ template <class P>
 void CudaEngine<P>::update_grid(double kick) {
   kick_ = kick;
   if (std::exchange(grid_is_ahead_, false)) return;
-  halo_.exchange(grid_.view(), comm_, stream_);
+  halo_.receive(comm_, stream_);
   launch_node_update(node_arguments(kick), stream_);
 }
 
@@ -145,7 +152,9 @@ void CudaEngine<P>::settle() {
   graph_.clear();
   counts_.fill_bytes(0, stream_);
   grid_.sort(particles_, own_planes(), stream_);
-  if (comm_.size() > 1) halo_.set(grid_.block_keys(stream_), boundaries_.periodicity(), slabs_, comm_, stream_);
+  if (comm_.size() > 1) {
+    halo_.set(grid_.block_keys(stream_), grid_.tiles(), boundaries_.periodicity(), slabs_, comm_, stream_);
+  }
   pass_sums_.reserve(grid_.pass_blocks());
   pass_sums_.fill_bytes(0, stream_);
 }

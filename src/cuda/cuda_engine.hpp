@@ -9,6 +9,7 @@
 #include "cuda/cuda_gravity.hpp"
 #include "cuda/device_array.hpp"
 #include "cuda/device_grid.hpp"
+#include "cuda/device_memory.hpp"
 #include "cuda/device_particles.hpp"
 #include "cuda/halo.hpp"
 #include "cuda/launchers.hpp"
@@ -62,8 +63,9 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   [[nodiscard]] PassArguments<Real> pass_arguments(double step, double half_step) const;
   [[nodiscard]] NodeArguments<Real> node_arguments(double kick) const;
   [[nodiscard]] PredictArguments<Real> predict_arguments(double time) const;
-  void launch_pass(const PassArguments<Real>& arguments);
+  void launch_pass(PassArguments<Real> arguments);
   void settle();
+  void require_memory(const Load& load) const;
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
   [[nodiscard]] ParticleOutput read_particles(const std::vector<Real>& new_velocity,
                                               const std::vector<Real>& node_mass) const;
@@ -74,6 +76,7 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
             const std::vector<std::vector<std::byte>>& messages);
   [[nodiscard]] std::vector<std::vector<std::byte>> messages_of(const std::vector<std::vector<unsigned>>& leaving,
                                                                 std::span<const grid::BlockKey> keys);
+  void drop_flaws_of_others();
   void save_flaws(EngineState& state) const;
   void switch_damage_off();
   [[nodiscard]] std::vector<Vec3d> positions() const;
@@ -91,6 +94,7 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   DeviceArray<BoundaryPlane> walls_;
   DeviceArray<float> flaw_thresholds_;
   std::vector<float> flaw_thresholds_host_;  // the same: they never change, and go with particles to other ranks
+  std::size_t own_flaws_ = 0;                // of them, the others belonging to particles that have gone
   DeviceArray<PassSums> pass_sums_;
   DeviceArray<unsigned> counts_;  // strayed particles; volume changes cut since the last sorting
   Transfer<Real> transfer_{};

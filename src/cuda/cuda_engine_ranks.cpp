@@ -71,7 +71,9 @@ std::vector<std::vector<std::byte>> CudaEngine<P>::messages_of(const std::vector
       std::int32_t count = 0;
       std::memcpy(&first, own + first_at, sizeof first);
       std::memcpy(&count, own + count_at, sizeof count);
-      put(messages[rank], flaw_thresholds_host_.data() + first, static_cast<std::size_t>(count >> 16));
+      const auto flaws = static_cast<std::size_t>(count >> 16);
+      put(messages[rank], flaw_thresholds_host_.data() + first, flaws);
+      own_flaws_ -= flaws;
     }
   }
   return messages;
@@ -101,14 +103,24 @@ void CudaEngine<P>::take(std::span<const unsigned> staying, std::vector<grid::Bl
       const auto flaws = static_cast<std::size_t>(count >> 16);
       flaw_thresholds_host_.resize(flaw_thresholds_host_.size() + flaws);
       get(from, flaw_thresholds_host_.data() + flaw_thresholds_host_.size() - flaws, flaws);
+      own_flaws_ += flaws;
     }
   }
   particles_.replace(staying, arrivals, stream_);
   grid_.set_block_keys(keys, stream_);
   if (particles_.groups().flaws) {
+    if (flaw_thresholds_host_.size() > 2 * own_flaws_) drop_flaws_of_others();
     flaw_thresholds_.reserve(flaw_thresholds_host_.size());
     flaw_thresholds_.upload(flaw_thresholds_host_, stream_);
   }
+}
+
+// Those of particles that have gone stay until they are the half.
+template <class P>
+void CudaEngine<P>::drop_flaws_of_others() {
+  material::FlawLists own = flaws();
+  flaw_thresholds_host_ = std::move(own.threshold);
+  particles_.upload(*particles_.find("flaw_first"), reinterpret_cast<const std::byte*>(own.first.data()), stream_);
 }
 
 template <class P>

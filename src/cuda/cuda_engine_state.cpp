@@ -24,7 +24,17 @@ void CudaEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
   // The host engine knows how positions become nodes and offsets; once, at the start.
   const auto host = grid::make_host_engine(setup_, comm_);
   host->insert(particles, flaws, spin_of_body);
+  const grid::EngineStats held = host->stats();
+  require_memory({.particles = held.particles,
+                  .tiles = held.tiles,
+                  .blocks = held.blocks,
+                  .flaws = host->flaws().threshold.size()});
   restore(host->save(), host->flaws());
+}
+
+template <class P>
+void CudaEngine<P>::require_memory(const Load& load) const {
+  cuda::require_memory(bytes_needed<P>(particles_.record_bytes(), load), comm_);
 }
 
 template <class P>
@@ -136,6 +146,7 @@ void CudaEngine<P>::restore_flaws(const EngineState& state, const material::Flaw
   upload("flaw_count", count);
   upload("next_threshold", next);
   flaw_thresholds_host_ = flaws.threshold;
+  own_flaws_ = flaws.threshold.size();
   flaw_thresholds_.reserve(flaw_thresholds_host_.size());
   flaw_thresholds_.upload(flaw_thresholds_host_, stream_);
 }

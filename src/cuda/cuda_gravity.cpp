@@ -25,7 +25,7 @@ CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& 
       comm_(comm),
       stream_(stream),
       bodies_(comm, stream),
-      tree_(stream),
+      tree_(comm, stream),
       walk_(stream) {}
 
 template <class Real>

@@ -35,6 +35,7 @@ void DeviceTree::weigh(double softening) {
   const std::int64_t coarse = gravity::coarse_limit(count_);
   launch_list_heavy(view(), coarse, heavy_.data(), stream_);
   launch_sample_scales(view(), bodies(), heavy_.data(), coarse, softening, stream_);
+  if (comm_.size() > 1) share_scales();
   for (auto level = levels_.rbegin(); level != levels_.rend(); ++level) {
     launch_combine_scales(view(), *level, stream_);
   }
@@ -74,6 +75,13 @@ void DeviceTree::grow() {
     levels_.push_back({cells_in_use_, children});
     cells_in_use_ += children;
   }
+}
+
+// Every rank has sampled the groups that hold its bodies. Of the largest double and a scale the scale is less.
+void DeviceTree::share_scales() {
+  std::vector<double> scales = scale_.download(cells_in_use_, stream_);
+  MPI_Allreduce(MPI_IN_PLACE, scales.data(), static_cast<int>(scales.size()), MPI_DOUBLE, MPI_MIN, comm_.handle());
+  scale_.upload(scales, stream_);
 }
 
 void DeviceTree::make_room(unsigned cells) {

@@ -7,12 +7,13 @@
 #include "cuda/device_array.hpp"
 #include "cuda/primitives.hpp"
 #include "cuda/tree_kernels.hpp"
+#include "mpi/comm.hpp"
 
 namespace breccia::cuda {
 
 class DeviceTree {
  public:
-  explicit DeviceTree(cudaStream_t stream) : stream_(stream) {}
+  DeviceTree(const mpi::Comm& comm, cudaStream_t stream) : comm_(comm), stream_(stream) {}
 
   /// Sorts the bodies, of which [first, first + own) are this rank's, grows the tree and weighs its cells. There must
   /// be one. The host waits once for each level.
@@ -27,7 +28,9 @@ class DeviceTree {
   void grow();
   void weigh(double softening);
   void make_room(unsigned cells);
+  void share_scales();
 
+  mpi::Comm comm_;
   cudaStream_t stream_;
   unsigned count_ = 0;  // of bodies
   unsigned cells_in_use_ = 0;

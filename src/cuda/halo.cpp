@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "cuda/launchers.hpp"
 
@@ -33,7 +34,7 @@ std::vector<std::vector<grid::BlockKey>> offers(std::span<const grid::BlockKey> 
 }  // namespace
 
 template <class Real>
-void Halo<Real>::set(std::span<const grid::BlockKey> blocks, const grid::Periodicity& periodicity,
+void Halo<Real>::set(std::span<const grid::BlockKey> blocks, unsigned tiles, const grid::Periodicity& periodicity,
                      const mpi::Slabs& slabs, const mpi::Comm& comm, cudaStream_t stream) {
   std::unordered_map<grid::BlockKey, unsigned> index;
   for (unsigned b = 0; b < blocks.size(); ++b) index[blocks[b]] = b;
@@ -54,6 +55,7 @@ void Halo<Real>::set(std::span<const grid::BlockKey> blocks, const grid::Periodi
     peers_.push_back(std::move(peer));
   }
   replace(sent_blocks_, sent, stream);
+  part_tiles(blocks, tiles, periodicity, stream);
   list_contributions(blocks.size(), comm.rank(), stream);
   sent_.reserve(shared_ * kBlockValues);
   received_.reserve(shared_ * kBlockValues);
@@ -92,24 +94,62 @@ void Halo<Real>::list_contributions(std::size_t blocks, int own_rank, cudaStream
 }
 
 template <class Real>
-void Halo<Real>::exchange(const GridView<Real>& grid, const mpi::Comm& comm, cudaStream_t stream) {
-  if (shared_ == 0) return;
-  const std::size_t bytes = shared_ * kBlockValues * sizeof(Real);
-  launch_collect_shared(grid, sent_blocks_.data(), static_cast<unsigned>(shared_), sent_.data(), stream);
-  check(cudaMemcpyAsync(sent_host_.data(), sent_.data(), bytes, cudaMemcpyDeviceToHost, stream), "halo");
-  check(cudaStreamSynchronize(stream), "halo");
-  std::vector<MPI_Request> requests;
-  std::size_t at = 0;
+void Halo<Real>::part_tiles(std::span<const grid::BlockKey> blocks, unsigned tiles,
+                            const grid::Periodicity& periodicity, cudaStream_t stream) {
+  std::unordered_set<grid::BlockKey> shared;
   for (const Peer& peer : peers_) {
-    const auto values = static_cast<int>(peer.blocks.size() * kBlockValues);
+    for (const unsigned block : peer.blocks) shared.insert(blocks[block]);
+  }
+  const auto reaches_shared = [&](grid::BlockKey key) {
+    const grid::BlockCoord own = grid::block_coord(key);
+    for (int n = 0; n < 27; ++n) {
+      const grid::BlockCoord other{own.x + n / 9 - 1, own.y + n / 3 % 3 - 1, own.z + n % 3 - 1};
+      if (shared.contains(grid::block_key(periodicity.wrap(other)))) return true;
+    }
+    return false;
+  };
+  std::vector<unsigned> boundary;
+  std::vector<unsigned> interior;
+  for (unsigned t = 0; t < tiles; ++t) (reaches_shared(blocks[t]) ? boundary : interior).push_back(t);
+  replace(boundary_, boundary, stream);
+  replace(interior_, interior, stream);
+  boundary_count_ = static_cast<unsigned>(boundary.size());
+  interior_count_ = static_cast<unsigned>(interior.size());
+}
+
+template <class Real>
+void Halo<Real>::send(const GridView<Real>& grid, cudaStream_t stream) {
+  scattered_.record(stream);
+  scattered_.precede(stream_);
+  launch_collect_shared(grid, sent_blocks_.data(), static_cast<unsigned>(shared_), sent_.data(), stream_);
+  if (!direct_) {
+    check(cudaMemcpyAsync(sent_host_.data(), sent_.data(), bytes(), cudaMemcpyDeviceToHost, stream_), "halo");
+  }
+  ready_.record(stream_);
+}
+
+template <class Real>
+void Halo<Real>::receive(const mpi::Comm& comm, cudaStream_t stream) {
+  if (!active()) return;
+  // The boundary of this step came after the nodes of the last one: nobody reads what that step received any more.
+  ready_.wait();
+  const Real* from = direct_ ? sent_.data() : sent_host_.data();
+  Real* to = direct_ ? received_.data() : received_host_.data();
+  std::vector<MPI_Request> requests;
+  for (const Peer& peer : peers_) {
+    const std::size_t values = peer.blocks.size() * kBlockValues;
     requests.emplace_back();
-    MPI_Irecv(received_host_.data() + at, values, mpi::datatype<Real>(), peer.rank, 2, comm.handle(), &requests.back());
+    MPI_Irecv(to, static_cast<int>(values), mpi::datatype<Real>(), peer.rank, 2, comm.handle(), &requests.back());
     requests.emplace_back();
-    MPI_Isend(sent_host_.data() + at, values, mpi::datatype<Real>(), peer.rank, 2, comm.handle(), &requests.back());
-    at += peer.blocks.size() * kBlockValues;
+    MPI_Isend(from, static_cast<int>(values), mpi::datatype<Real>(), peer.rank, 2, comm.handle(), &requests.back());
+    from += values;
+    to += values;
   }
   MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
-  check(cudaMemcpyAsync(received_.data(), received_host_.data(), bytes, cudaMemcpyHostToDevice, stream), "halo");
+  if (direct_) return;
+  check(cudaMemcpyAsync(received_.data(), received_host_.data(), bytes(), cudaMemcpyHostToDevice, stream_), "halo");
+  arrived_.record(stream_);
+  arrived_.precede(stream);
 }
 
 template <class Real>

@@ -1,11 +1,14 @@
 // Sums of blocks that the particles of several ranks reach. Every such rank sends what it holds to every other one, and
-// all of them add in the order of ranks: they find the same velocities, and nothing has to come back.
+// all of them add in the order of ranks: they find the same velocities, and nothing has to come back. The sums travel
+// on a stream of their own while the tiles that no other rank waits for are at work.
 #pragma once
 
 #include <vector>
 
 #include "cuda/device_array.hpp"
+#include "cuda/device_mpi.hpp"
 #include "cuda/step_arguments.hpp"
+#include "cuda/stream.hpp"
 #include "mpi/comm.hpp"
 #include "mpi/slabs.hpp"
 
@@ -14,11 +17,20 @@ namespace breccia::cuda {
 template <class Real>
 class Halo {
  public:
-  /// `blocks`: keys of this rank's blocks, in their order. Collective.
-  void set(std::span<const grid::BlockKey> blocks, const grid::Periodicity& periodicity, const mpi::Slabs& slabs,
-           const mpi::Comm& comm, cudaStream_t stream);
-  /// After a scatter, before the nodes are updated. By way of pinned memory: the host waits. Collective.
-  void exchange(const GridView<Real>& grid, const mpi::Comm& comm, cudaStream_t stream);
+  /// `blocks`: keys of this rank's blocks, in their order, the first `tiles` of them with a tile. Collective.
+  void set(std::span<const grid::BlockKey> blocks, unsigned tiles, const grid::Periodicity& periodicity,
+           const mpi::Slabs& slabs, const mpi::Comm& comm, cudaStream_t stream);
+  /// True if any block is shared.
+  [[nodiscard]] bool active() const { return shared_ > 0; }
+  /// Tiles that reach shared blocks, and all others.
+  [[nodiscard]] TileList boundary() const { return {boundary_.data(), boundary_count_}; }
+  [[nodiscard]] TileList interior() const { return {interior_.data(), interior_count_}; }
+  /// Once `stream` has done what it has, the boundary's scatter, sums start on their way.
+  void send(const GridView<Real>& grid, cudaStream_t stream);
+  /// Ends what send() began: what `stream` does next finds the sums of other ranks. The host waits once, for the sums
+  /// of the boundary: MPI knows nothing of streams. By way of pinned memory, unless MPI reads that of the device.
+  /// Collective.
+  void receive(const mpi::Comm& comm, cudaStream_t stream);
   [[nodiscard]] SharedView<Real> view() const;
   /// Sent in one step.
   [[nodiscard]] std::size_t bytes() const { return shared_ * kBlockValues * sizeof(Real); }
@@ -29,6 +41,8 @@ class Halo {
     int rank;
     std::vector<unsigned> blocks;  // in the order of their keys, which is the same on both sides
   };
+  void part_tiles(std::span<const grid::BlockKey> blocks, unsigned tiles, const grid::Periodicity& periodicity,
+                  cudaStream_t stream);
   void list_contributions(std::size_t blocks, int own_rank, cudaStream_t stream);
 
   std::vector<Peer> peers_;
@@ -36,6 +50,11 @@ class Halo {
   DeviceArray<unsigned> sent_blocks_, list_of_block_, first_, lower_, places_;
   DeviceArray<Real> sent_, received_;
   PinnedArray<Real> sent_host_, received_host_;
+  DeviceArray<unsigned> boundary_, interior_;
+  unsigned boundary_count_ = 0, interior_count_ = 0;
+  bool direct_ = mpi_takes_device_memory();
+  Stream stream_;
+  Event scattered_, ready_, arrived_;
 };
 
 extern template class Halo<float>;

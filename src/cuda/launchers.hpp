@@ -16,7 +16,7 @@ constexpr unsigned blocks_for(unsigned items, unsigned threads) { return (items 
 /// Allows the shared memory of the tile pass. Once for a device.
 template <class Real>
 void prepare_tile_pass();
-/// The whole pass over the particles in tiles (tile_pass.cuh); no tiles: nothing.
+/// The whole pass over the particles in tiles (tile_pass.cuh), or over some of them; no tiles: nothing.
 template <class Real>
 void launch_tile_pass(const PassArguments<Real>& a, cudaStream_t stream);
 /// The whole pass over lone particles (lone_pass.cuh).

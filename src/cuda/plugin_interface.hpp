@@ -13,6 +13,8 @@ struct PluginInterface {
   const char* version;
   /// Why no device can be used, or null. `name` gets the device of this process, the `local_rank`-th on its node.
   const char* (*select_device)(int local_rank, std::string& name);
+  /// How many ranks use the selected device. Collective.
+  int (*ranks_on_device)(const mpi::Comm& comm);
   /// On the selected device; for the caller to delete.
   grid::Engine* (*make_engine)(const grid::EngineSetup& setup, const mpi::Comm& comm);
 };

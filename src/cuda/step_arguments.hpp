@@ -64,6 +64,14 @@ struct SharedView {
   const Real* received = nullptr;           ///< [place][kSums][64]
 };
 
+/// The tiles of a launch that does not take all.
+struct TileList {
+  static constexpr unsigned kAll = 0xffffffffU;
+
+  const unsigned* tiles = nullptr;  ///< null: tile t by thread block t
+  unsigned count = kAll;
+};
+
 /// Transfer after physics.md 5: d = alpha (v_p - v_old); v_p = v_new + d; x += dt (v_new + beta d).
 template <class Real>
 struct Transfer {
@@ -75,6 +83,7 @@ template <class Real>
 struct PassArguments {
   ParticleView<Real> particles;
   GridView<Real> grid;
+  TileList only;
 
   unsigned first_lone = 0;    ///< slot; lone particles follow those in tiles
   unsigned lone = 0;          ///< number of them

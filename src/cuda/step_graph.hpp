@@ -1,21 +1,9 @@
-// A stream, and the launches of a step as a graph that one call repeats.
+// The launches of a step as a graph that one call repeats.
 #pragma once
 
-#include "cuda/check.hpp"
+#include "cuda/stream.hpp"
 
 namespace breccia::cuda {
-
-class Stream {
- public:
-  Stream() { check(cudaStreamCreate(&stream_), "stream"); }
-  ~Stream() { (void)cudaStreamDestroy(stream_); }
-  Stream(const Stream&) = delete;
-  Stream& operator=(const Stream&) = delete;
-  operator cudaStream_t() const { return stream_; }
-
- private:
-  cudaStream_t stream_ = nullptr;
-};
 
 class StepGraph {
  public:

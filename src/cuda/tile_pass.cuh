@@ -254,7 +254,7 @@ template <class Real>
 __global__ void __launch_bounds__(kPassThreads, kPassBlocks<Real>) tile_pass(PassArguments<Real> a) {
   BRECCIA_SHARED(TileShared<Real>, shared);
   const int thread = static_cast<int>(threadIdx.x);
-  const unsigned tile = blockIdx.x;
+  const unsigned tile = a.only.tiles == nullptr ? blockIdx.x : a.only.tiles[blockIdx.x];
   const unsigned first = a.grid.first[tile];
   const auto particles = static_cast<int>(a.grid.first[tile + 1] - first);
 
@@ -293,8 +293,9 @@ void prepare_tile_pass() {
 
 template <class Real>
 void launch_tile_pass(const PassArguments<Real>& a, cudaStream_t stream) {
-  if (a.grid.tiles == 0) return;
-  BRECCIA_LAUNCH(tile_pass<Real>, dim3(a.grid.tiles), dim3(kPassThreads), sizeof(TileShared<Real>), stream, a);
+  const unsigned tiles = a.only.count == TileList::kAll ? a.grid.tiles : a.only.count;
+  if (tiles == 0) return;
+  BRECCIA_LAUNCH(tile_pass<Real>, dim3(tiles), dim3(kPassThreads), sizeof(TileShared<Real>), stream, a);
   check(cudaGetLastError(), "launch of the tile pass");
 }
 

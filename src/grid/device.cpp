@@ -62,6 +62,15 @@ std::pair<std::string, std::string> select(int local_rank) {
   return {name, why_not == nullptr ? "" : why_not};
 }
 
+// Ranks that share a device take turns.
+std::string warning_of_sharing(const mpi::Comm& comm) {
+  const auto most = comm.max(static_cast<std::uint64_t>(plugin().interface->ranks_on_device(comm)));
+  if (most == 1) return "";
+  return "up to " + std::to_string(most) +
+         " ranks share a CUDA device and wait for each other: one rank for each "
+         "device is faster";
+}
+
 std::unique_ptr<Engine> make_cuda_engine(const EngineSetup& setup, const mpi::Comm& comm) {
   return std::unique_ptr<Engine>(plugin().interface->make_engine(setup, comm));
 }
@@ -69,14 +78,14 @@ std::unique_ptr<Engine> make_cuda_engine(const EngineSetup& setup, const mpi::Co
 }  // namespace
 
 EngineChoice choose_engine(Device wanted, const mpi::Comm& comm) {
-  if (wanted == Device::kHost) return {&make_host_engine, "host", ""};
+  if (wanted == Device::kHost) return {&make_host_engine, "host", "", ""};
   auto [name, why_not] = select(rank_on_node(comm));
-  if (!comm.any(!why_not.empty())) return {&make_cuda_engine, "cuda", name};
+  if (!comm.any(!why_not.empty())) return {&make_cuda_engine, "cuda", warning_of_sharing(comm), name};
   if (why_not.empty()) why_not = "other ranks have no CUDA device";
   if (wanted == Device::kCuda) {
     throw UsageError("--device cuda: " + why_not + "; use --device host or auto");
   }
-  return {&make_host_engine, "host", plugin().in_this_build ? why_not : ""};
+  return {&make_host_engine, "host", "", plugin().in_this_build ? why_not : ""};
 }
 
 std::string describe_cuda() {

@@ -12,8 +12,9 @@ enum class Device { kAuto, kHost, kCuda };
 
 struct EngineChoice {
   EngineMaker make;
-  std::string device;  ///< "host" or "cuda"
-  std::string reason;  ///< of a device: its name; of the host: why no CUDA device, empty where none was to be expected
+  std::string device;   ///< "host" or "cuda"
+  std::string warning;  ///< to be printed; the same on all ranks
+  std::string reason;   ///< of a device: its name; of the host: why no CUDA device, empty where none was to be expected
 };
 
 /// The engine to use, the same on all ranks: that of this node's CUDA devices, if every rank can have one, for kAuto

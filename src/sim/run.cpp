@@ -273,7 +273,9 @@ grid::Device device_for(const Scene& scene, grid::Device wanted) {
 }
 
 void print_device(const grid::EngineChoice& engine, const mpi::Comm& comm) {
-  if (!comm.is_root() || engine.reason.empty()) return;
+  if (!comm.is_root()) return;
+  if (!engine.warning.empty()) fmt::print(stderr, "breccia: warning: {}\n", engine.warning);
+  if (engine.reason.empty()) return;
   fmt::print("device: {} ({})\n", engine.device, engine.reason);
 }
 

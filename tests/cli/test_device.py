@@ -11,9 +11,14 @@ from command import CommandTest, breccia
 EMULATED = os.environ["BRECCIA_EMULATED_CUDA"]
 
 
-def devices(library, count=1):
-    """The environment of a machine with this library and so many devices."""
-    return mock.patch.dict(os.environ, BRECCIA_CUDA_LIBRARY=str(library), BRECCIA_EMULATED_DEVICES=str(count))
+def devices(library, count=1, memory=2 << 30):
+    """The environment of a machine with this library and so many devices, each with so many bytes."""
+    return mock.patch.dict(
+        os.environ,
+        BRECCIA_CUDA_LIBRARY=str(library),
+        BRECCIA_EMULATED_DEVICES=str(count),
+        BRECCIA_EMULATED_MEMORY=str(memory),
+    )
 
 
 class Device(CommandTest):
@@ -24,8 +29,8 @@ class Device(CommandTest):
         with open(self.folder / out / "diagnostics.csv", newline="", encoding="utf-8") as file:
             return list(csv.DictReader(file))[-1]
 
-    def run_scene(self, out, *options, ranks=1):
-        return breccia("run", self.write_scene(), "--steps", "40", "--out", out, *options, ranks=ranks, cwd=self.folder)
+    def run_scene(self, out, *options, ranks=1, steps=40):
+        return breccia("run", self.write_scene(), "--steps", str(steps), "--out", out, *options, ranks=ranks, cwd=self.folder)
 
     def test_without_the_library(self):
         with devices(self.folder / "none.so"):
@@ -65,11 +70,25 @@ class Device(CommandTest):
             self.assertAlmostEqual(float(cuda[name]) / float(host[name]), 1.0, delta=1e-5, msg=name)
 
     def test_a_device_for_each_rank(self):
-        with devices(EMULATED):
+        with devices(EMULATED, 2):
             process = self.run_scene("two", "--device", "cuda", ranks=2)
             self.assertEqual(process.returncode, 0, process.stderr)
-            self.assertEqual(process.stdout.count("device: cuda (emulated device (1 of 1)"), 1)
+            self.assertNotIn("warning", process.stderr)
+            self.assertEqual(process.stdout.count("device: cuda (emulated device (1 of 2)"), 1)
         self.assertEqual((self.summary("two")["device"], self.summary("two")["ranks"]), ("cuda", 2))
+
+    def test_more_ranks_than_devices(self):
+        with devices(EMULATED):
+            process = self.run_scene("two", "--device", "cuda", ranks=2, steps=2)
+            self.assertEqual(process.returncode, 0, process.stderr)
+            self.assertEqual(process.stderr.count("warning: up to 2 ranks share a CUDA device"), 1)
+
+    def test_too_little_memory(self):
+        with devices(EMULATED, memory=50_000):
+            for ranks in (1, 2):
+                process = self.run_scene("a", "--device", "cuda", ranks=ranks)
+                self.assert_fails(process, 2, "emulated device has not enough memory")
+                self.assertRegex(process.stderr, rf"needed by {ranks} ranks? \(\d+ bytes\), 0.01 GB available")
 
     def test_run_continues_on_the_other_device(self):
         with devices(EMULATED):

@@ -52,6 +52,34 @@ TEST(Emulation, CopiesAreCheckedAgainstAllocations) {
   cudaStreamDestroy(stream);
 }
 
+// What a wait or an event orders is done, what nothing orders is not.
+TEST(Emulation, StreamsAreLate) {
+  cuda_emulation::set_order(Order::kForward);
+  cudaStream_t first = nullptr, second = nullptr;
+  cudaEvent_t event = nullptr;
+  void* memory = nullptr;
+  ASSERT_EQ(cudaStreamCreate(&first), cudaSuccess);
+  ASSERT_EQ(cudaStreamCreate(&second), cudaSuccess);
+  ASSERT_EQ(cudaEventCreateWithFlags(&event, cudaEventDisableTiming), cudaSuccess);
+  ASSERT_EQ(cudaMalloc(&memory, sizeof(int)), cudaSuccess);
+  for (const bool ordered : {false, true}) {
+    int result = 0;
+    cudaMemsetAsync(memory, 0, sizeof(int), first);
+    cudaStreamSynchronize(first);
+    cudaMemsetAsync(memory, 1, sizeof(int), first);
+    cudaEventRecord(event, first);
+    if (ordered) cudaStreamWaitEvent(second, event, 0);
+    cudaMemcpyAsync(&result, memory, sizeof(int), cudaMemcpyDeviceToHost, second);
+    cudaStreamSynchronize(second);
+    EXPECT_EQ(result, ordered ? 0x01010101 : 0);
+    cudaEventSynchronize(event);
+  }
+  cudaFree(memory);
+  cudaEventDestroy(event);
+  cudaStreamDestroy(first);
+  cudaStreamDestroy(second);
+}
+
 TEST(Emulation, GraphRepeatsWhatTheStreamWouldDo) {
   cuda_emulation::set_order(Order::kForward);
   cudaStream_t stream = nullptr;
@@ -69,9 +97,11 @@ TEST(Emulation, GraphRepeatsWhatTheStreamWouldDo) {
   ASSERT_EQ(cudaGraphDestroy(graph), cudaSuccess);
   int result = -1;
   cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
+  cudaStreamSynchronize(stream);
   EXPECT_EQ(result, 0);
   for (int n = 0; n < 3; ++n) EXPECT_EQ(cudaGraphLaunch(executable, stream), cudaSuccess);
   cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
+  cudaStreamSynchronize(stream);
   EXPECT_EQ(result, 3 * kSum);
   cudaGraphExecDestroy(executable);
   cudaFree(total);

@@ -3,8 +3,10 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cstdlib>
 
 #include "breccia/error.hpp"
+#include "grid/setup_choices.hpp"
 #include "tests/cuda/engine_cases.hpp"
 
 namespace breccia::cuda {
@@ -254,6 +256,49 @@ TEST_P(CudaEngineTest, StepIsThreeLaunchesWithoutWaiting) {
   }
   EXPECT_EQ(cuda_emulation::launch_count() - launches, 15U);
   EXPECT_EQ(cuda_emulation::synchronisation_count(), waits);
+}
+
+// What is asked of the device before a run is what it takes, and not much more.
+TEST_P(CudaEngineTest, MemoryIsKnownBefore) {
+  for (const Scene& scene : {small_impact(GetParam()), debris(GetParam())}) {
+    const EngineSetup setup = setup_for(scene);
+    const auto host = grid::make_host_engine(setup, self());
+    fill(*host, scene);
+    const grid::EngineStats held = host->stats();
+    const Load load{held.particles, held.tiles, held.blocks, host->flaws().threshold.size()};
+    const std::uint64_t needed =
+        GetParam() == Precision::kDouble
+            ? bytes_needed<DoublePrecision>(DeviceParticles<DoublePrecision>(grid::groups_for(setup)).record_bytes(),
+                                            load)
+            : bytes_needed<MixedPrecision>(DeviceParticles<MixedPrecision>(grid::groups_for(setup)).record_bytes(),
+                                           load);
+    const auto device = make_cuda_engine(setup);
+    const std::size_t before = cuda_emulation::most_bytes();
+    cuda_emulation::forget_most_bytes();
+    fill(*device, scene);
+    device->scatter(0.5 * kStep);
+    device->update_grid(kStep);
+    device->gather(kStep);
+    device->sort();
+    EXPECT_LE(cuda_emulation::most_bytes(), needed + 4096) << before;  // and what no particle determines
+    EXPECT_GE(cuda_emulation::most_bytes(), needed / 2);
+  }
+}
+
+TEST_P(CudaEngineTest, TooLittleMemoryIsSaidBefore) {
+  const Scene scene = small_impact(GetParam());
+  setenv("BRECCIA_EMULATED_MEMORY", "100000", 1);
+  const auto engine = make_cuda_engine(setup_for(scene));
+  std::string message;
+  try {
+    fill(*engine, scene);
+  } catch (const UsageError& error) {
+    message = error.what();
+  }
+  unsetenv("BRECCIA_EMULATED_MEMORY");
+  EXPECT_NE(message.find("has not enough memory"), std::string::npos) << message;
+  EXPECT_NE(message.find(" needed by 1 rank ("), std::string::npos) << message;
+  EXPECT_NE(message.find(" bytes), 0.01 GB available ("), std::string::npos) << message;
 }
 
 TEST_P(CudaEngineTest, FreesWhatItTook) {

@@ -31,6 +31,7 @@ int main(int count, char** arguments) {
   if (fault == "global_overrun") run<Fault::kGlobalOverrun>(total, stream);
   int result = 0;
   cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
+  cudaStreamSynchronize(stream);
   cudaFree(memory);
   cudaStreamDestroy(stream);
   std::printf("%d\n", result);

@@ -28,6 +28,7 @@ int run(cuda_emulation::Order order) {
     BRECCIA_LAUNCH(sum_of_blocks<kFault>, dim3(kBlocks), dim3(kThreads), sizeof(Values), stream,
                    static_cast<int*>(total));
     EXPECT_EQ(cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream), cudaSuccess);
+    EXPECT_EQ(cudaStreamSynchronize(stream), cudaSuccess);
   } catch (const EmulationError& e) {
     error = e.what();
   }

@@ -1,5 +1,7 @@
 // The CUDA engine on several ranks, each with an emulated device of its own, against the host engine on one: particles
-// that migrate with their flaws, sums of shared blocks, slabs that are cut anew.
+// that migrate with their flaws, sums of shared blocks that travel on a stream of their own, by way of the host's
+// memory or not, slabs that are cut anew.
+#include <cstdlib>
 #include <cstring>
 #include <set>
 
@@ -62,6 +64,92 @@ TEST_P(CudaRanks, PeriodsAndWallsEqualHostEngine) {
                       {{-40e3, 0, 0}, {1, 0, 0}, BoundaryKind::kPeriodic, 0.0},
                       {{-40e3 + length, 0, 0}, {-1, 0, 0}, BoundaryKind::kPeriodic, 0.0}};
   expect_equal(scene, 40, world_);
+}
+
+// After some steps and a sorting.
+EngineState state_of(const Scene& scene, const mpi::Comm& world) {
+  const auto device = make_cuda_engine(setup_for(scene), world);
+  fill(*device, scene, world);
+  advance(*device, 15, kStep);
+  device->gather(kStep);
+  device->sort();
+  return device->save();
+}
+
+void expect_same_bits(const EngineState& a, const EngineState& b) {
+  EXPECT_EQ(a.node, b.node);
+  for (std::size_t c = 0; c < a.columns.size(); ++c) {
+    EXPECT_EQ(a.columns[c].values, b.columns[c].values) << a.columns[c].name;
+  }
+}
+
+// Device memory to MPI, as where it is CUDA-aware (that of the emulation is the host's), and streams that run whenever
+// they may: neither changes a bit.
+TEST_P(CudaRanks, WayAndMomentOfTheExchangeChangeNothing) {
+  const Scene scene = drifting(small_impact(GetParam()));
+  const EngineState staged = state_of(scene, world_);
+  setenv("BRECCIA_CUDA_AWARE_MPI", "1", 1);
+  expect_same_bits(state_of(scene, world_), staged);
+  cuda_emulation::set_order(Order::kRandom, 5);
+  expect_same_bits(state_of(scene, world_), staged);
+  unsetenv("BRECCIA_CUDA_AWARE_MPI");
+  expect_same_bits(state_of(scene, world_), staged);
+}
+
+// Five launches, and one wait where blocks are shared.
+TEST_P(CudaRanks, StepWaitsOnceForTheExchange) {
+  const Scene scene = small_impact(GetParam());
+  const auto engine = make_cuda_engine(setup_for(scene), world_);
+  fill(*engine, scene, world_);
+  engine->scatter(0.5 * kStep);
+  engine->update_grid(kStep);
+  ASSERT_GT(engine->stats().halo_bytes_per_step, 0U);
+  const std::uint64_t launches = cuda_emulation::launch_count();
+  const std::uint64_t waits = cuda_emulation::synchronisation_count();
+  for (int n = 0; n < 5; ++n) {
+    engine->gather_scatter(kStep);
+    engine->update_grid(kStep);
+  }
+  EXPECT_LE(cuda_emulation::launch_count() - launches, 25U);
+  EXPECT_EQ(cuda_emulation::synchronisation_count() - waits, 5U);
+}
+
+// Particles that pass from rank to rank leave no flaws behind for ever: memory stays.
+TEST_P(CudaRanks, FlawsOfParticlesThatHaveGoneAreDropped) {
+  constexpr int cells = 24;
+  constexpr std::uint32_t flaws_each = 50;
+  Scene scene = small_impact(GetParam());
+  scene.boundaries = {{{0, 0, 0}, {1, 0, 0}, BoundaryKind::kPeriodic, 0.0},
+                      {{cells * scene.cell, 0, 0}, {-1, 0, 0}, BoundaryKind::kPeriodic, 0.0}};
+  ParticleArrays row;  // of all ranks, as each finds its own; far apart along y, so that nothing deforms
+  for (std::uint64_t n = 0; n < cells; ++n) {
+    if (static_cast<int>(n) % world_.size() != world_.rank()) continue;
+    row.id.push_back(n);
+    row.position.push_back(scene.cell * Vec3d{static_cast<double>(n) + 0.3, 12.0 * static_cast<double>(n), 0.2});
+    row.velocity.push_back({0.9 * scene.cell, 0.0, 0.0});
+    row.mass.push_back(2700.0 * std::pow(scene.cell, 3));
+    row.body.push_back(0);
+    row.material.push_back(0);
+    row.damage.push_back(0.0);
+  }
+  material::FlawLists flaws;
+  for (std::size_t i = 0; i <= row.size(); ++i) flaws.first.push_back(static_cast<std::uint32_t>(i) * flaws_each);
+  flaws.threshold.assign(row.size() * flaws_each, 1.0F);
+  const auto engine = make_cuda_engine(setup_for(scene), world_);
+  const std::vector<Vec3d> spin(1);
+  engine->insert(row, flaws, spin);
+  const auto held = [&] { return engine->stats().particle_bytes; };
+  std::uint64_t most_at_first = 0, most = 0;
+  for (int n = 0; n < 3 * cells; ++n) {  // almost three times around
+    engine->scatter(0.5);
+    engine->update_grid(1.0);
+    engine->gather(1.0);
+    engine->sort();
+    (n < cells ? most_at_first : most) = std::max(n < cells ? most_at_first : most, held());
+    EXPECT_EQ(engine->flaws().threshold.size(), engine->flaws().first.size() * flaws_each - flaws_each);
+  }
+  // All flaws twice and the room that arrays keep; without the dropping three times as many as at first.
+  EXPECT_LE(most, most_at_first + most_at_first / 8);
 }
 
 // A state goes on as it was, on the same ranks and, cut anew, on fewer.

@@ -70,6 +70,7 @@ class Step {
     std::vector<std::byte> values(grid_.tiles() * std::size_t{kSums} * kTileNodes * sizeof(Real));
     check(cudaMemcpyAsync(values.data(), grid_.view().partial_sums, values.size(), cudaMemcpyDeviceToHost, stream_),
           "sums");
+    check(cudaStreamSynchronize(stream_), "sums");
     return values;
   }
   void set(const Fields& all) {

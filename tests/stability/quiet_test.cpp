@@ -61,12 +61,21 @@ Shape shape_of(const ParticleOutput& p) {
 }
 
 // Row 27. Danger: float drift of volume and energy over a million steps of a body at rest. Guard: sums without loss.
-// A rubble sphere rings and settles for 8192 steps (5000 s); from then on its size may change by 0.5 % (measured 0.02
-// %), and it may neither heat (1 J/kg; its elastic energy is 0.03) nor move (1 mm/s). `pressure_bound`: inside it,
-// relative, since friction holds less and less of the initial shear. `speed_bound` [m/s]: rms, of 61 m/s of escape;
-// torques of the transfer are random, and the sphere turns by 3e-6 rad/s at most, 0.3 % of its critical spin, in 5e5 s.
-void expect_rest(const char* precision, std::uint64_t steps, double pressure_bound, double speed_bound) {
-  const Scene scene = load(sphere("0 rad/s", 1.0, 0.6103515625, 32), {std::string("numerics.precision=") + precision});
+// A rubble sphere rings and settles for 8192 steps (5000 s); from then on its size may change by 0.5 %, and it may
+// neither heat (1 J/kg; its elastic energy is 0.03) nor move (1 mm/s).
+// Pressure inside 25 km, relative, is what creeps, and the reason is the lattice, not rounding (mixed and double agree
+// to five digits, elastic matter creeps as well): with 1.4 particles per cell some motions of nodes have next to no
+// gradient at the particles, nothing elastic resists them, and weight pulls the body along them at 0.05 mm/s, by 10 m
+// and 15 to 20 % of P in 5e5 s. ASFLIP adds torques at random, 2e-6 rad/s, so that such a body also turns through the
+// grid and rearranges. With 8 per cell both are gone.
+struct RestBounds {
+  double pressure;  // relative
+  double speed;     // rms [m/s], of 61 m/s of escape
+};
+void expect_rest(const char* precision, const char* spacing, std::uint64_t steps, const RestBounds& bounds) {
+  const Scene scene =
+      load(sphere("0 rad/s", 1.0, 0.6103515625, 32),
+           {std::string("numerics.precision=") + precision, std::string("body[0].spacing=\"") + spacing + "\""});
   Shape settled, end;
   simulate(scene, [&](const TimeLoop& loop) {
     if (loop.step() == 8192) settled = shape_of(loop.engine().observe());
@@ -74,20 +83,70 @@ void expect_rest(const char* precision, std::uint64_t steps, double pressure_bou
     end = shape_of(loop.engine().observe());
     return false;
   });
+  std::printf("at rest, spacing %s, %llu steps: size %+.2e, pressure %+.2e, heat %+.2e J/kg, %.2e m/s\n", spacing,
+              static_cast<unsigned long long>(steps), end.radius / settled.radius - 1.0,
+              end.pressure / settled.pressure - 1.0, end.heat - settled.heat,
+              std::sqrt(2.0 * end.kinetic / scene.bodies[0].mass));
   EXPECT_NEAR(end.radius, settled.radius, 5e-3 * settled.radius);
-  EXPECT_NEAR(end.pressure, settled.pressure, pressure_bound * settled.pressure);
+  EXPECT_NEAR(end.pressure, settled.pressure, bounds.pressure * settled.pressure);
   EXPECT_GT(settled.pressure, 1e6);
   EXPECT_NEAR(end.heat, settled.heat, 1.0);
-  EXPECT_LT(end.kinetic / scene.bodies[0].mass, 0.5 * speed_bound * speed_bound);
+  EXPECT_LT(end.kinetic / scene.bodies[0].mass, 0.5 * bounds.speed * bounds.speed);
   EXPECT_LT(end.momentum, 1e-3);
 }
 TEST(Quiet, RubbleAtRestStaysAtRest) {
-  for (const char* precision : {"mixed", "double"}) expect_rest(precision, 16384, 0.01, 0.02);
+  for (const char* precision : {"mixed", "double"}) expect_rest(precision, "12.5 km", 16384, {0.01, 0.02});
 }
 
-// The whole of row 27, 8e5 steps; ctest runs it under the label long. Measured: the pressure creeps up by 15 % of the
-// way from Love's (1.74 MPa) to the hydrostatic one (2.55 MPa), 0.08 m/s.
-TEST(QuietForLong, RubbleAtRestStaysAtRest) { expect_rest("mixed", 800000, 0.25, 0.2); }
+// The whole of row 27, 8e5 steps; ctest runs it under the label long: 1.4 particles per cell creep.
+TEST(QuietForLong, RubbleAtRestStaysAtRest) { expect_rest("mixed", "12.5 km", 800000, {0.25, 0.2}); }
+
+// With 8 per cell the pressure keeps to the 1 % of physics.md 8; only in tools/torture.
+TEST(QuietTorture, DenseRubbleAtRestKeepsItsPressure) { expect_rest("mixed", "7 km", 800000, {0.01, 1e-3}); }
+
+// Rubble that turns at half of its critical spin (4e-4 1/s) for 1e5 s, six turns. It deforms at first, which is its
+// right; from 1e4 s on spin, shape (c/a of the ellipsoid of equal inertia), energy and heat may only creep. Measured:
+// spin -0.18 %, c/a -7e-4. I + dt C of a rotation stretches by (Omega dt)^2/2, which does the work P Omega^2 dt/(2 rho)
+// = 2.7e-5 J/kg/s (physics.md 4): +2.5 J/kg, 3.6 % of the kinetic energy.
+struct Turning {
+  double spin = 0.0, flattening = 0.0;
+};
+Turning turning_of(const ParticleOutput& p) {
+  double momentum = 0.0, across = 0.0, along = 0.0;
+  for (std::size_t i = 0; i < p.size(); ++i) {
+    const Vec3d& x = p.position[i];
+    momentum += p.mass[i] * cross(x, p.velocity[i]).z;
+    across += p.mass[i] * (x.x * x.x + x.y * x.y);
+    along += p.mass[i] * x.z * x.z;
+  }
+  return {momentum / across, std::sqrt(2.0 * along / across)};
+}
+TEST(QuietTorture, TurningRubbleKeepsSpinAndShape) {
+  const Scene scene = load(sphere("4e-4 rad/s", 1.0, 0.6103515625, 32), {"body[0].spacing=\"7 km\""});
+  std::optional<Budget> budget;
+  Turning settled, end;
+  Shape before, after;
+  io::DiagnosticsRow first, last;
+  simulate(scene, [&](const TimeLoop& loop) {
+    const bool start = loop.step() == 16384, stop = loop.time() >= 1e5;
+    if (!start && !stop) return true;
+    if (!budget) budget.emplace(loop.solver(), Vec3d{}, mpi::Comm(MPI_COMM_SELF));
+    const ParticleOutput p = loop.engine().observe();
+    last = budget->row(loop.engine(), p, loop.lost_work());
+    (start ? settled : end) = turning_of(p);
+    (start ? before : after) = shape_of(p);
+    if (start) first = last;
+    return !stop;
+  });
+  const double spin = end.spin / settled.spin - 1.0, shape = end.flattening - settled.flattening;
+  const double energy = last.energy_residual / first.kinetic_energy;
+  std::printf("turning, 1e5 s: spin %+.2e, c/a %.4f %+.2e, energy %+.2e of kinetic, heat %+.2e J/kg\n", spin,
+              settled.flattening, shape, energy, after.heat - before.heat);
+  EXPECT_LT(std::abs(spin), 0.01);
+  EXPECT_LT(std::abs(shape), 0.005);
+  EXPECT_LT(std::abs(energy), 0.05);
+  EXPECT_NEAR(after.heat, before.heat, 5.0);
+}
 
 }  // namespace
 }  // namespace breccia::sim::test

@@ -5,7 +5,8 @@ import os
 import subprocess
 import time
 
-from torture_parts import fuzz, kill, mutate, sanitizers
+import torture_random
+from torture_parts import fuzz, kill, mutate, quiet, sanitizers
 
 EPILOG = """\
 Without a part all of them run, one after the other. The last line is the summary; the exit code is 0 only if nothing was
@@ -21,11 +22,13 @@ def parse(arguments=None):
         ("kill", kill, "kill ranks of a running command at random moments; it must go on bit for bit"),
         ("mutate", mutate, "damage checkpoints; they must be refused or read"),
         ("fuzz", fuzz, "libFuzzer on the parsers and the checkpoint reader (clang-16)"),
+        ("random", torture_random, "random scenes; what any run must keep"),
     ):
         part = parts.add_parser(name, help=text, description=text)
         part.add_argument("--quick", action="store_true", default=argparse.SUPPRESS, help="a small share")
         module.add_options(part)
     for name, text in (
+        ("quiet", "bodies that rest or turn for 8e5 steps and 1e5 s; what creeps"),
         ("sanitize", "all tests under the address and undefined-behaviour sanitizers"),
         ("threads", "the threaded engine under the thread sanitizer (clang-16)"),
     ):
@@ -52,6 +55,8 @@ def main(root):
         "kill": kill.run,
         "mutate": mutate.run,
         "fuzz": fuzz.run,
+        "random": torture_random.run,
+        "quiet": quiet.run,
         "sanitize": sanitizers.run_address,
         "threads": sanitizers.run_threads,
     }

@@ -385,6 +385,10 @@ void set_order(Order order, std::uint64_t seed) {
   machine().random.seed(seed);
 }
 
+std::size_t early_stream(std::size_t streams) {
+  return machine().order == Order::kRandom ? machine().random() % (2 * streams) : streams;
+}
+
 void run_kernel(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes,
                 const std::function<void()>& body) {
   machine().run(kernel, grid, block, shared_bytes, body);

@@ -30,7 +30,7 @@ class EmulationError : public std::runtime_error {
 };
 
 /// In which order lanes of a block, and blocks, run between two barriers. Random: one warp at a time runs ahead of the
-/// others, lanes and blocks are shuffled.
+/// others, lanes and blocks are shuffled, streams go on before anybody waits for them.
 enum class Order { kForward, kReverse, kRandom };
 void set_order(Order order, std::uint64_t seed = 1);
 
@@ -38,6 +38,9 @@ void set_order(Order order, std::uint64_t seed = 1);
 std::uint64_t launch_count();
 /// Calls that made the host wait for the device.
 std::uint64_t synchronisation_count();
+/// Most device memory in use at a time since it was last forgotten [bytes].
+std::size_t most_bytes();
+void forget_most_bytes();
 /// Allocations of device memory that are not freed.
 std::size_t live_allocations();
 

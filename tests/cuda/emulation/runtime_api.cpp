@@ -1,7 +1,9 @@
 #include "tests/cuda/emulation/runtime_api.hpp"
 
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
+#include <deque>
 #include <functional>
 #include <map>
 #include <vector>
@@ -10,19 +12,42 @@
 
 struct EmulatedGraph {
   std::vector<std::function<void()>> work;
+  std::uint64_t launches = 0;
 };
 struct EmulatedStream {
   EmulatedGraph* capturing = nullptr;
+  std::deque<std::function<void()>> waiting;
+  std::uint64_t enqueued = 0;
+  std::uint64_t done = 0;
+
+  void run_until(std::uint64_t count) {
+    while (done < count) {
+      const std::function<void()> work = std::move(waiting.front());
+      waiting.pop_front();
+      ++done;
+      work();
+    }
+  }
+};
+struct EmulatedEvent {
+  EmulatedStream* stream = nullptr;  // null: never recorded
+  std::uint64_t after = 0;           // that much of the stream's work
 };
 
 namespace breccia::cuda_emulation {
 
+// A stream that goes on before anybody waits for it, or none (a number beyond the last).
+std::size_t early_stream(std::size_t streams);
 void run_kernel(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes,
                 const std::function<void()>& body);
 
 namespace {
 
-constexpr std::size_t kDeviceBytes = std::size_t{2} << 30;
+// BRECCIA_EMULATED_MEMORY: bytes of the device.
+std::size_t device_bytes() {
+  const char* wanted = std::getenv("BRECCIA_EMULATED_MEMORY");
+  return wanted == nullptr ? std::size_t{2} << 30 : std::strtoull(wanted, nullptr, 10);
+}
 #if defined(__SANITIZE_ADDRESS__)
 constexpr std::size_t kGuard = 0;  // the sanitizer sees every access beyond the end
 #else
@@ -33,6 +58,7 @@ constexpr unsigned char kFill = 0xff;
 struct Memory {
   std::map<const unsigned char*, std::size_t> allocations;
   std::size_t used = 0;
+  std::size_t most = 0;          // used at any time
   std::uint64_t generation = 1;  // changes with the allocations
 
   [[nodiscard]] std::span<const unsigned char> around(const void* address) const {
@@ -58,19 +84,31 @@ std::uint64_t launches = 0;
 const Substitutes* substitutes = nullptr;
 std::uint64_t synchronisations = 0;
 
-// Now, or as a part of the graph that the stream captures.
+int device_of_this = 0;
+std::vector<EmulatedStream*> streams;
+
+void run_all() {
+  for (std::size_t n = 0; n < streams.size(); ++n) streams[n]->run_until(streams[n]->enqueued);
+}
+
+// Later, or as a part of the graph that the stream captures.
 void enqueue(cudaStream_t stream, std::function<void()> work) {
-  if (stream != nullptr && stream->capturing != nullptr) {
+  if (stream->capturing != nullptr) {
     stream->capturing->work.push_back(std::move(work));
-  } else {
-    work();
+    return;
   }
+  stream->waiting.push_back(std::move(work));
+  ++stream->enqueued;
+  const std::size_t early = early_stream(streams.size());
+  if (early < streams.size()) streams[early]->run_until(streams[early]->enqueued);
 }
 
 }  // namespace
 
 std::uint64_t launch_count() { return launches; }
 std::uint64_t synchronisation_count() { return synchronisations; }
+std::size_t most_bytes() { return memory().most; }
+void forget_most_bytes() { memory().most = memory().used; }
 std::size_t live_allocations() { return memory().allocations.size(); }
 
 std::span<const unsigned char> allocation_of(const void* address) { return memory().around(address); }
@@ -89,10 +127,8 @@ const Substitute* substitute_for(const std::string& kernel, const std::vector<st
 
 void launch(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
             std::function<void()> body) {
-  enqueue(stream, [=, body = std::move(body)] {
-    ++launches;
-    run_kernel(kernel, grid, block, shared_bytes, body);
-  });
+  ++(stream->capturing == nullptr ? launches : stream->capturing->launches);
+  enqueue(stream, [=, body = std::move(body)] { run_kernel(kernel, grid, block, shared_bytes, body); });
 }
 
 }  // namespace breccia::cuda_emulation
@@ -121,26 +157,34 @@ cudaError_t cudaGetDeviceCount(int* count) {
   *count = wanted == nullptr ? 1 : std::atoi(wanted);
   return *count > 0 ? cudaSuccess : cudaErrorNoDevice;
 }
-cudaError_t cudaSetDevice(int) { return cudaSuccess; }
-cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int) {
-  *properties = {"emulated device", breccia::cuda_emulation::kDeviceBytes, 9, 0};
+cudaError_t cudaSetDevice(int device) {
+  breccia::cuda_emulation::device_of_this = device;
+  return cudaSuccess;
+}
+cudaError_t cudaGetDevice(int* device) {
+  *device = breccia::cuda_emulation::device_of_this;
+  return cudaSuccess;
+}
+cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
+  *properties = {"emulated device", breccia::cuda_emulation::device_bytes(), 9, 0, 0, device, 0};
   return cudaSuccess;
 }
 cudaError_t cudaMemGetInfo(std::size_t* available, std::size_t* total) {
-  *total = breccia::cuda_emulation::kDeviceBytes;
+  *total = breccia::cuda_emulation::device_bytes();
   *available = *total - memory().used;
   return cudaSuccess;
 }
 
 cudaError_t cudaMalloc(void** address, std::size_t bytes) {
   using namespace breccia::cuda_emulation;
-  if (memory().used + bytes > kDeviceBytes) return cudaErrorMemoryAllocation;
+  if (memory().used + bytes > device_bytes()) return cudaErrorMemoryAllocation;
   auto* start = static_cast<unsigned char*>(std::malloc(bytes + 2 * kGuard));
   if (start == nullptr) return cudaErrorMemoryAllocation;
   std::memset(start, kFill, bytes + 2 * kGuard);
   memory().allocations[start + kGuard] = bytes;
   ++memory().generation;
   memory().used += bytes;
+  memory().most = std::max(memory().most, memory().used);
   *address = start + kGuard;
   return cudaSuccess;
 }
@@ -148,6 +192,7 @@ cudaError_t cudaMalloc(void** address, std::size_t bytes) {
 cudaError_t cudaFree(void* address) {
   using namespace breccia::cuda_emulation;
   if (address == nullptr) return cudaSuccess;
+  run_all();  // as the runtime waits
   const auto found = memory().allocations.find(static_cast<unsigned char*>(address));
   if (found == memory().allocations.end()) return cudaErrorInvalidValue;
   auto* start = static_cast<unsigned char*>(address);
@@ -167,6 +212,7 @@ cudaError_t cudaMallocHost(void** address, std::size_t bytes) {
   return *address != nullptr ? cudaSuccess : cudaErrorMemoryAllocation;
 }
 cudaError_t cudaFreeHost(void* address) {
+  breccia::cuda_emulation::run_all();
   std::free(address);
   return cudaSuccess;
 }
@@ -189,15 +235,44 @@ cudaError_t cudaMemsetAsync(void* to, int value, std::size_t bytes, cudaStream_t
 
 cudaError_t cudaStreamCreate(cudaStream_t* stream) {
   *stream = new EmulatedStream;
+  breccia::cuda_emulation::streams.push_back(*stream);
   return cudaSuccess;
 }
+cudaError_t cudaStreamCreateWithFlags(cudaStream_t* stream, unsigned) { return cudaStreamCreate(stream); }
 cudaError_t cudaStreamDestroy(cudaStream_t stream) {
+  breccia::cuda_emulation::run_all();
+  std::erase(breccia::cuda_emulation::streams, stream);
   delete stream;
   return cudaSuccess;
 }
 cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
   ++breccia::cuda_emulation::synchronisations;
-  return stream->capturing == nullptr ? cudaSuccess : cudaErrorInvalidValue;
+  if (stream->capturing != nullptr) return cudaErrorInvalidValue;
+  stream->run_until(stream->enqueued);
+  return cudaSuccess;
+}
+cudaError_t cudaEventCreateWithFlags(cudaEvent_t* event, unsigned) {
+  *event = new EmulatedEvent;
+  return cudaSuccess;
+}
+cudaError_t cudaEventDestroy(cudaEvent_t event) {
+  delete event;
+  return cudaSuccess;
+}
+cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream) {
+  if (stream->capturing != nullptr) return cudaErrorInvalidValue;  // not emulated
+  *event = {stream, stream->enqueued};
+  return cudaSuccess;
+}
+cudaError_t cudaEventSynchronize(cudaEvent_t event) {
+  ++breccia::cuda_emulation::synchronisations;
+  if (event->stream != nullptr) event->stream->run_until(event->after);
+  return cudaSuccess;
+}
+cudaError_t cudaStreamWaitEvent(cudaStream_t stream, cudaEvent_t event, unsigned) {
+  if (event->stream == nullptr) return cudaSuccess;
+  breccia::cuda_emulation::enqueue(stream, [then = *event] { then.stream->run_until(then.after); });
+  return cudaSuccess;
 }
 cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode) {
   if (stream->capturing != nullptr) return cudaErrorInvalidValue;
@@ -213,8 +288,11 @@ cudaError_t cudaGraphInstantiate(cudaGraphExec_t* executable, cudaGraph_t graph,
   *executable = new EmulatedGraph(*graph);
   return cudaSuccess;
 }
-cudaError_t cudaGraphLaunch(cudaGraphExec_t executable, cudaStream_t) {
-  for (const auto& work : executable->work) work();
+cudaError_t cudaGraphLaunch(cudaGraphExec_t executable, cudaStream_t stream) {
+  breccia::cuda_emulation::launches += executable->launches;
+  breccia::cuda_emulation::enqueue(stream, [graph = *executable] {
+    for (const auto& work : graph.work) work();
+  });
   return cudaSuccess;
 }
 cudaError_t cudaGraphDestroy(cudaGraph_t graph) {

@@ -1,0 +1,39 @@
+// Streams of a device, and events that order them.
+#pragma once
+
+#include "cuda/check.hpp"
+
+namespace breccia::cuda {
+
+class Stream {
+ public:
+  Stream() { check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream"); }
+  ~Stream() { (void)cudaStreamDestroy(stream_); }
+  Stream(const Stream&) = delete;
+  Stream& operator=(const Stream&) = delete;
+  operator cudaStream_t() const { return stream_; }
+
+ private:
+  cudaStream_t stream_ = nullptr;
+};
+
+/// A moment of a stream.
+class Event {
+ public:
+  Event() { check(cudaEventCreateWithFlags(&event_, cudaEventDisableTiming), "event"); }
+  ~Event() { (void)cudaEventDestroy(event_); }
+  Event(const Event&) = delete;
+  Event& operator=(const Event&) = delete;
+
+  /// When all that was enqueued so far is done.
+  void record(cudaStream_t stream) { check(cudaEventRecord(event_, stream), "event"); }
+  /// What is enqueued on `stream` from now on comes after the moment.
+  void precede(cudaStream_t stream) const { check(cudaStreamWaitEvent(stream, event_, 0), "event"); }
+  /// The host waits for it.
+  void wait() const { check(cudaEventSynchronize(event_), "event"); }
+
+ private:
+  cudaEvent_t event_ = nullptr;
+};
+
+}  // namespace breccia::cuda

@@ -1,0 +1,51 @@
+"""tools/gpu-check without a GPU: what it says, and all that it does with the library of the emulated device."""
+
+import ctypes
+import json
+import os
+import subprocess
+import tempfile
+import unittest
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+
+
+def gpu_check(*options):
+    return subprocess.run([ROOT / "tools/gpu-check", *options], capture_output=True, text=True, check=False)
+
+
+class GpuCheck(unittest.TestCase):
+    def test_without_a_device(self):
+        try:
+            ctypes.CDLL("libcuda.so.1")
+            self.skipTest("there is a driver here")
+        except OSError:
+            pass
+        process = gpu_check()
+        self.assertEqual((process.returncode, process.stdout), (2, ""))
+        self.assertRegex(process.stderr, "^gpu-check: there is no CUDA device here .*: nothing has been checked\n$")
+
+    def test_on_the_emulated_device(self):
+        with tempfile.TemporaryDirectory() as folder:
+            file = Path(folder) / "check.json"
+            process = gpu_check("--emulated", "--build", os.environ["BRECCIA_BUILD"], "--json", str(file))
+            self.assertEqual(process.returncode, 0, process.stdout + process.stderr)
+            found = json.loads(file.read_text(encoding="utf-8"))
+        self.assertTrue(found["emulated"])
+        self.assertEqual(found["tests"]["failed"], [])
+        self.assertEqual(found["tests"]["passed"], 10)
+        self.assertEqual({rate["precision"] for rate in found["rates"]}, {"mixed", "double"})
+        for rate in found["rates"]:
+            self.assertGreater(rate["device"], 0)
+            self.assertGreater(rate["host"], 0)
+        self.assertIn("emulated", process.stdout)
+
+    def test_build_that_is_not_there(self):
+        process = gpu_check("--emulated", "--build", "/nowhere")
+        self.assertEqual(process.returncode, 2)
+        self.assertIn("/nowhere has no", process.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
