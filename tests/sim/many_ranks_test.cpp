@@ -165,6 +165,7 @@ precision = "double"
   expect_equal(all.end, one, {8e3, 2000.0});
   EXPECT_EQ(busy_ranks(all.start), std::min<std::size_t>(2, static_cast<std::size_t>(comm.size())));
   EXPECT_EQ(farthest_move(all), comm.size() - 1);
+  EXPECT_EQ(busy_ranks(all.end), std::min<std::size_t>(2, static_cast<std::size_t>(comm.size())));
 }
 
 }  // namespace
