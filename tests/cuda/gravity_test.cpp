@@ -111,41 +111,58 @@ TEST_P(CudaGravityTest, DirectSumEqualsHosts) {
   }
 }
 
-// Two bodies and ejecta far around them: cells of all sizes, and targets of all kinds.
-Scene crowd(Precision precision) {
+void number(Scene& scene) {
+  std::uint64_t id = 0;
+  for (BodyParameters& body : scene.bodies) {
+    body.first_id = id;
+    id += body.particles;
+  }
+}
+
+// Two bodies: cells of all sizes, and targets of all kinds.
+Scene bodies(Precision precision) {
   Scene scene = small_impact(precision);
   for (BodyParameters& body : scene.bodies) body.particles = 1200;
+  number(scene);
+  return scene;
+}
+
+// The same with ejecta far around them.
+Scene crowd(Precision precision) {
+  Scene scene = bodies(precision);
   scene.bodies.push_back(scene.bodies[0]);
   BodyParameters& ejecta = scene.bodies.back();
   ejecta.lattice = Lattice::kRandom;
   ejecta.particles = 700;
   ejecta.semi_axes = {900e3, 300e3, 300e3};
   ejecta.mass *= 0.1;
-  std::uint64_t id = 0;
-  for (BodyParameters& body : scene.bodies) {
-    body.first_id = id;
-    id += body.particles;
-  }
+  number(scene);
   return scene;
 }
 
 // The same tree, the same cells for the same targets, on any number of ranks. Groups on the border between two ranks
-// are summed by both. In mixed precision the host divides a sparse group of this scene, which the device does not: a
-// seventh of the error that both may have.
+// are summed by both.
 TEST_P(CudaGravityTest, TreeEqualsHosts) {
   for (const double softening : {0.0, 500.0}) {
     const Parameters parameters{.softening = softening, .precision = GetParam()};
-    const Fields fields = evaluate(crowd(GetParam()), GravityMethod::kTree, parameters, world_);
-    EXPECT_LE(fields.rms, is_double() ? 1e-12 : 5e-5) << softening;
+    const Fields fields = evaluate(bodies(GetParam()), GravityMethod::kTree, parameters, world_);
+    EXPECT_LE(fields.rms, is_double() ? 1e-12 : 3e-6) << softening;
     EXPECT_GT(fields.device_stats.cell_interactions, 0.0);
     EXPECT_GT(fields.device_stats.expansions, 0.0);
-    if (world_.size() == 1 && is_double()) {
+    if (world_.size() == 1) {
       EXPECT_EQ(fields.device_stats.pairs, fields.host_stats.pairs);
       EXPECT_EQ(fields.device_stats.cell_interactions, fields.host_stats.cell_interactions);
       EXPECT_EQ(fields.device_stats.expansions, fields.host_stats.expansions);
     }
     EXPECT_NEAR(fields.device_stats.momentum_error, fields.host_stats.momentum_error, 1e-6);
   }
+}
+
+// The host divides sparse groups, the device does not: cells stand for particles in different places, with the same
+// bound of error, 3.5e-4. gravity.md 6.7 asks for 2e-5.
+TEST_P(CudaGravityTest, TreeOfDebrisIsHostsWithinItsError) {
+  const Fields fields = evaluate(crowd(GetParam()), GravityMethod::kTree, {.precision = GetParam()}, world_);
+  EXPECT_LE(fields.rms, 2e-5);
 }
 
 // Counts and lists, scans and sums: none may depend on which thread comes first.
