@@ -30,9 +30,11 @@ class Ptx : public testing::TestWithParam<std::tuple<const char*, Precision>> {
   [[nodiscard]] int steps(int most) const { return std::string_view(arch()) == "sm_90" ? most : most / 5; }
 };
 
-void expect_equal_to_host(const Scene& scene, int steps) {
-  const auto host = grid::make_host_engine(setup_for(scene), self());
-  const auto device = make_cuda_engine(setup_for(scene));
+void expect_equal_to_host(const Scene& scene, int steps, const material::RuntimeEffects& effects = kRock) {
+  EngineSetup setup = setup_for(scene);
+  setup.effects = effects;
+  const auto host = grid::make_host_engine(setup, self());
+  const auto device = make_cuda_engine(setup);
   for (Engine* engine : {host.get(), device.get()}) {
     fill(*engine, scene);
     advance(*engine, steps, kStep);
@@ -55,12 +57,13 @@ TEST_P(Ptx, DebrisEqualsHostEngine) {
   expect_equal_to_host(debris(precision()), steps(20));
 }
 
+// Rubble: in float, the last bit decides in which step a rock at the limit of a flaw begins to crack.
 TEST_P(Ptx, WallsEqualHostEngine) {
   const Translated translated("production", arch());
   Scene scene = small_impact(precision());
   scene.boundaries = {{{0, -20e3, 0}, {0, 1, 0}, BoundaryKind::kFriction, 0.4},
                       {{0, 0, -25e3}, {0, 0, 1}, BoundaryKind::kSlip, 0.0}};
-  expect_equal_to_host(scene, steps(25));
+  expect_equal_to_host(scene, steps(25), kGranular);
 }
 
 // Without fused multiply-adds nvcc and g++ do the same arithmetic: every bit of a state after a sorting is the same.
