@@ -49,7 +49,7 @@ void expect_equal_to_host(const Scene& scene, int steps, const material::Runtime
 
 TEST_P(Ptx, CollisionEqualsHostEngine) {
   const Translated translated("production", arch());
-  expect_equal_to_host(small_impact(precision()), steps(200));
+  expect_equal_to_host(small_impact(precision()), steps(100));
 }
 
 TEST_P(Ptx, DebrisEqualsHostEngine) {
