@@ -42,6 +42,8 @@ std::size_t Blocks::slot_of(BlockIndex index) const {
   return slot;
 }
 
+void Blocks::prefetch(BlockIndex index) const { __builtin_prefetch(&slots_[hash(index) & (slots_.size() - 1)]); }
+
 Block& Blocks::at(BlockIndex index) {
   const std::size_t slot = slot_of(index);
   if (slots_[slot] >= 0) return all_[static_cast<std::size_t>(slots_[slot])];
@@ -57,13 +59,24 @@ void Blocks::grow() {
 }
 
 Blocks count_in_blocks(ParticlesView particles, double width) {
+  // Each particle of debris asks for another block, and waits for memory unless that has been told so long before.
+  constexpr std::size_t kAhead = 16;
   Blocks blocks;
   BlockIndex last{};
   Block* here = nullptr;
   const double per_width = 1.0 / width;
-  for (std::size_t i = 0; i < particles.position.size(); ++i) {
+  const std::size_t n = particles.position.size();
+  BlockIndex soon[kAhead] = {};
+  const auto look_ahead = [&](std::size_t i) {
+    if (i >= n) return;
+    soon[i % kAhead] = block_of(particles.position[i], per_width);
+    blocks.prefetch(soon[i % kAhead]);
+  };
+  for (std::size_t i = 0; i < kAhead; ++i) look_ahead(i);
+  for (std::size_t i = 0; i < n; ++i) {
     const Vec3d p = particles.position[i];
-    const BlockIndex index = block_of(p, per_width);
+    const BlockIndex index = soon[i % kAhead];
+    look_ahead(i + kAhead);
     // Particles mostly come in the order of space.
     if (here == nullptr || !equal(index, last)) here = &blocks.at(last = index);
     here->add(1, particles.mass[i], {p, p});

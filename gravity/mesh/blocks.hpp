@@ -30,6 +30,8 @@ class Blocks {
 
   /// The block, made if it is not there yet.
   Block& at(BlockIndex index);
+  /// Brings the memory that at() or find() of this block will ask for first.
+  void prefetch(BlockIndex index) const;
   /// Place of a block in all(), or -1.
   [[nodiscard]] std::int64_t find(BlockIndex index) const { return slots_[slot_of(index)]; }
   [[nodiscard]] const std::vector<Block>& all() const { return all_; }
