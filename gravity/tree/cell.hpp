@@ -15,13 +15,13 @@ inline constexpr std::int64_t kGroupParticles = 128;
 /// all that any of them needs. Measured: a tenth of the time in states b and f of gravity.md 3.
 inline constexpr std::int64_t kSparseGroupParticles = 64;
 
-inline constexpr std::int32_t kStub = -1;
+inline constexpr std::int32_t kUnknownChildren = -1;
 
 /// Lengths in Root::unit, masses in the caller's unit, G = 1. Children follow each other and come after their parent.
 /// What the walk asks for fills one cache line.
 struct alignas(64) Cell {
   std::int32_t first_child = 0;
-  std::int32_t children = 0;        ///< kStub: unknown here
+  std::int32_t children = 0;        ///< kUnknownChildren: another rank knows them
   std::int32_t begin = 0, end = 0;  ///< particles in this rank's arrays
   std::int64_t count = 0;           ///< particles, those of all ranks
   double radius = 0.0;              ///< no particle is farther from the centre
@@ -32,7 +32,7 @@ struct alignas(64) Cell {
 
   [[nodiscard]] BRECCIA_HD bool is_leaf() const { return children <= 0; }
   /// Has children or particles that this rank does not know.
-  [[nodiscard]] BRECCIA_HD bool is_stub() const { return children < 0; }
+  [[nodiscard]] BRECCIA_HD bool has_unknown_parts() const { return children < 0; }
   /// Targets below this cell share its interactions.
   [[nodiscard]] BRECCIA_HD bool is_group() const { return count <= kGroupParticles || is_leaf(); }
   /// Stays whole even in sparse matter.

@@ -189,7 +189,7 @@ void graft(Tree& tree, const std::vector<SentCell>& cells, const std::vector<Sen
       child.centre = c.centre;
       child.moments = {c.mass, {c.second[0], c.second[1], c.second[2], c.second[3], c.second[4], c.second[5]}};
       child.is_target = false;
-      child.children = kStub;
+      child.children = kUnknownChildren;
       tree.cells.push_back(child);
     }
     Cell& cell = tree.cells[static_cast<std::size_t>(place[q])];

@@ -14,7 +14,7 @@ namespace breccia::gravity {
 /// largest double.
 std::vector<double> acceleration_scales(const Tree& tree, std::span<const Cell> others, double softening, int threads);
 
-/// Takes the scales of the first `count` cells from their children, but for groups and stubs.
+/// Takes the scales of the first `count` cells from their children, but for groups and cells with unknown parts.
 void take_least_of_children(const Tree& tree, std::size_t count, std::vector<double>& scales);
 
 }  // namespace breccia::gravity

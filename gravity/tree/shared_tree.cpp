@@ -222,7 +222,7 @@ void SharedTree::grow_below() {
     if (leaf.owner == comm_.rank()) {
       own.push_back(leaf.cell);
     } else {
-      tree_.cells[static_cast<std::size_t>(leaf.cell)].children = kStub;
+      tree_.cells[static_cast<std::size_t>(leaf.cell)].children = kUnknownChildren;
     }
   }
   tree_.grow(own, threads_);

@@ -229,7 +229,7 @@ class Walker {
       for (std::size_t k = 0; k < n; ++k) {
         const Cell& source = sources_.cell(w.level[k]);
         const Opening how = source.count > kFewParticles ? w.how[k] : Opening::kOpen;
-        const bool missing = source.is_stub() & (how == Opening::kOpen);
+        const bool missing = source.has_unknown_parts() & (how == Opening::kOpen);
         const bool leaf = source.is_leaf() & (how == Opening::kOpen);
         w.counts.missing += missing ? 1.0 : 0.0;
         lists[missing ? 1 : leaf ? 3 : static_cast<int>(how)].add(w.level[k]);

@@ -12,6 +12,7 @@
 #include "breccia/error.hpp"
 #include "io/checksum.hpp"
 #include "tests/sim/collision.hpp"
+#include "tests/support/shared_file.hpp"
 
 namespace breccia::sim::test {
 namespace {
@@ -35,26 +36,6 @@ std::vector<Sample> samples(const ParticleOutput& p, const mpi::Comm& comm) {
   std::sort(all.begin(), all.end(), [](const Sample& a, const Sample& b) { return a.id < b.id; });
   return all;
 }
-
-// A file all ranks see, in the folder of rank 0.
-class SharedFile {
- public:
-  explicit SharedFile(const mpi::Comm& comm) : comm_(comm) {
-    const auto pid = comm.allgather(static_cast<std::int64_t>(getpid()))[0];
-    path_ = std::filesystem::temp_directory_path() / ("breccia_checkpoint_" + std::to_string(pid) + ".h5");
-  }
-  ~SharedFile() {
-    comm_.barrier();
-    if (comm_.is_root()) std::filesystem::remove(path_);
-  }
-  SharedFile(const SharedFile&) = delete;
-  SharedFile& operator=(const SharedFile&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  mpi::Comm comm_;
-  std::filesystem::path path_;
-};
 
 struct Outcome {
   std::vector<Sample> end;
@@ -126,7 +107,7 @@ void expect_near(const Outcome& one, const Outcome& other) {
 void expect_bitwise(std::vector<std::string> overrides, bool breaking = false) {
   overrides.emplace_back("gravity.interval=8");
   const mpi::Comm comm;
-  const SharedFile file(comm);
+  const breccia::test::SharedFile file("checkpoint", comm);
   const Scene scene = load(collision(9e3), overrides);
   const Outcome whole = run_through(scene, file.path(), comm);
   const Outcome parts = run_on(scene, file.path(), whole.at_checkpoint, comm);
@@ -157,7 +138,7 @@ TEST(Checkpoint, LoneParticles) {
 TEST(Checkpoint, SlabsCutAnew) {
   const std::vector<std::string> overrides{"gravity.interval=8", "parallel.balance=always", "numerics.precision=mixed"};
   const mpi::Comm comm;
-  const SharedFile file(comm);
+  const breccia::test::SharedFile file("checkpoint", comm);
   const Scene scene = load(collision(9e3), overrides);
   const Outcome whole = run_through(scene, file.path(), comm);
   const Outcome parts = run_on(scene, file.path(), whole.at_checkpoint, comm);
@@ -170,7 +151,7 @@ TEST(Checkpoint, SlabsCutAnew) {
 // Neither the interrupted run nor the continued one depends on the threads.
 TEST(Checkpoint, OtherNumberOfThreads) {
   const mpi::Comm comm;
-  const SharedFile file(comm);
+  const breccia::test::SharedFile file("checkpoint", comm);
   const Scene scene = load(collision(9e3), {"gravity.interval=8", "numerics.precision=mixed"});
   const Outcome whole = run_through(scene, file.path(), comm, 3);
   expect_same_bits(whole, run_on(scene, file.path(), whole.at_checkpoint, comm, 2));
@@ -180,7 +161,7 @@ TEST(Checkpoint, OtherNumberOfThreads) {
 // What cannot be a state is refused on all ranks, though one rank alone holds it.
 TEST(Checkpoint, StatesThatAreNone) {
   const mpi::Comm comm;
-  const SharedFile file(comm);
+  const breccia::test::SharedFile file("checkpoint", comm);
   const Scene scene = load(collision(9e3), {"gravity.interval=8"});
   const Outcome whole = run_through(scene, file.path(), comm);
   const auto column = [](EngineState& state, const std::string& name) -> StateColumn& {
@@ -241,7 +222,7 @@ TEST(Checkpoint, WholeNumbersOfTheRunStateAreWholeAndFit) {
 // Mixed precision, damage growing: what there is most of. HDF5's own tables are some kB.
 TEST(Checkpoint, BytesPerParticle) {
   const mpi::Comm comm;
-  const SharedFile file(comm);
+  const breccia::test::SharedFile file("checkpoint", comm);
   const Scene scene = load(collision(5e3), {"gravity.interval=8", "numerics.precision=mixed"});
   TimeLoop loop(scene, resolve_effects(scene), 1, comm);
   const auto particles = static_cast<double>(comm.sum(loop.engine().stats().particles));
@@ -256,7 +237,7 @@ TEST(Checkpoint, BytesPerParticle) {
 // Damage that ended before the checkpoint: its fields are gone while the scene asks for them.
 TEST(Checkpoint, DamageFinished) {
   const mpi::Comm comm;
-  const SharedFile file(comm);
+  const breccia::test::SharedFile file("checkpoint", comm);
   Scene scene =
       load(collision(9e3), {"body[0].damage=1", "body[1].damage=1", "effects.damage=on", "gravity.interval=8"});
   const Outcome whole = run_through(scene, file.path(), comm);
@@ -267,7 +248,7 @@ TEST(Checkpoint, DamageFinished) {
 // Cut across another axis where it goes on: the same to rounding, as on another number of ranks.
 TEST(Checkpoint, OtherAxisOfSlabs) {
   const mpi::Comm comm;
-  const SharedFile file(comm);
+  const breccia::test::SharedFile file("checkpoint", comm);
   const Scene scene = load(collision(9e3), {"gravity.interval=8"});
   const Outcome whole = run_through(scene, file.path(), comm);
   const Scene across = load(collision(9e3), {"gravity.interval=8", "parallel.axis=z"});
@@ -283,7 +264,7 @@ TEST(Checkpoint, OtherAxisOfSlabs) {
 TEST(Checkpoint, OtherNumberOfRanks) {
   const mpi::Comm comm;
   const mpi::Comm self(MPI_COMM_SELF);
-  const SharedFile file(comm);
+  const breccia::test::SharedFile file("checkpoint", comm);
   const Scene scene = load(collision(9e3), {"gravity.interval=8"});
   const Outcome whole = run_through(scene, file.path(), comm);
   const Outcome alone = run_on(scene, file.path(), whole.at_checkpoint, self);

@@ -9,31 +9,12 @@
 #include "sim/setup.hpp"
 #include "tests/sim/collision.hpp"
 #include "tests/sim/states.hpp"
+#include "tests/support/shared_file.hpp"
 
 namespace breccia::sim::test {
 namespace {
 
 constexpr std::uint64_t kCheckpoint = 8, kEnd = 16;
-
-// A file of rank 0 that all ranks see.
-class SharedFile {
- public:
-  SharedFile(const std::string& name, const mpi::Comm& comm) : comm_(comm) {
-    const auto pid = comm.allgather(static_cast<std::int64_t>(getpid()))[0];
-    path_ = std::filesystem::temp_directory_path() / ("breccia_many_" + name + std::to_string(pid) + ".h5");
-  }
-  ~SharedFile() {
-    comm_.barrier();
-    if (comm_.is_root()) std::filesystem::remove(path_);
-  }
-  SharedFile(const SharedFile&) = delete;
-  SharedFile& operator=(const SharedFile&) = delete;
-  [[nodiscard]] const std::filesystem::path& path() const { return path_; }
-
- private:
-  mpi::Comm comm_;
-  std::filesystem::path path_;
-};
 
 struct Ends {
   State start, end;
@@ -90,8 +71,8 @@ void expect_same(std::vector<std::string> overrides, double tolerance) {
   overrides.emplace_back("gravity.interval=8");
   const mpi::Comm comm;
   const mpi::Comm self(MPI_COMM_SELF);
-  const SharedFile of_one("one", comm);
-  const SharedFile of_all("all", comm);
+  const breccia::test::SharedFile of_one("many_one", comm);
+  const breccia::test::SharedFile of_all("many_all", comm);
   const Scene scene = load(collision(25e3), overrides);
   State root_alone;
   if (comm.is_root()) root_alone = start_anew(scene, of_one.path(), self).end;
