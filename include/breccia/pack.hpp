@@ -178,6 +178,13 @@ BRECCIA_HD Pack<S, 8> rearranged(Pack<S, 8> a) {
   }
 }
 
+/// Both halves of sixteen lanes rearranged alike; for registers that hold them.
+template <int... kFrom, class S>
+BRECCIA_HD Pack<S, 16> rearranged(Pack<S, 16> a) {
+  static_assert(sizeof...(kFrom) == 8 && !detail::kIsWide<S, 16>);
+  return Pack<S, 16>(__builtin_shufflevector(a.v, a.v, kFrom..., (8 + kFrom)...));
+}
+
 /// First and second half of the lanes.
 template <class S, int W>
 BRECCIA_HD Pack<S, W / 2> lower(Pack<S, W> a) {

@@ -5,6 +5,7 @@
 #include "grid/blocks.hpp"
 #include "grid/boundary.hpp"
 #include "grid/engine.hpp"
+#include "grid/occupancy.hpp"
 #include "grid/ordered_sums.hpp"
 #include "grid/sweep_plan.hpp"
 #include "grid/tile.hpp"
@@ -14,16 +15,9 @@
 
 namespace breccia::grid {
 
-/// A particle on the way to its tile: where it is now and its nearest node in global coordinates.
-struct Placement {
-  std::uint32_t slot;
-  std::int32_t node[3];
-};
-
-/// The particles of a sorting: in tiles, and alone.
-struct SortedPlacements {
-  std::vector<Placement> tiled;
-  std::vector<Placement> lone;
+/// Which cells along each axis hold particles of a tile: bit n for cell n of its stack.
+struct OccupiedCells {
+  std::uint16_t axis[3] = {0, 0, 0};
 };
 
 /// Nodes of a block that a rank asks the owner for: bit n for the plane n across the slabs.
@@ -79,6 +73,7 @@ class HostEngine final : public Engine {
   void report_fault();
   void run_task(const SweepTask& task, const PassArguments<P>& arguments, const NodeArguments<P>* trailing,
                 std::vector<TileReport>& reports);
+  void update_stack(const Tile& tile, const NodeArguments<P>& arguments);
 
   // Exchange with other ranks (host_engine_halo.cpp).
   [[nodiscard]] bool has_neighbours() const { return !sum_exchange_.empty() || !velocity_exchange_.empty(); }
@@ -104,10 +99,13 @@ class HostEngine final : public Engine {
   void choose_slabs(std::span<const Placement> placements);
   [[nodiscard]] std::vector<Placement> place_all() const;
   void migrate(std::vector<Placement>& placements);
-  [[nodiscard]] SortedPlacements separate(std::vector<Placement> placements);
-  [[nodiscard]] bool lone_strayed() const;  // more than a node since the last sorting
-  void arrange(const SortedPlacements& placements);
+  [[nodiscard]] std::vector<char> find_lone(Occupancy& occupancy) const;  // for each block of it
+  void tell_neighbours(Occupancy& occupancy) const;                       // of what this rank's blocks hold
+  [[nodiscard]] bool lone_strayed() const;                                // more than a node since the last sorting
+  void arrange(std::span<const Placement> placements);
+  [[nodiscard]] std::vector<std::uint32_t> find_tiles(const Occupancy& occupancy, std::span<const char> lone);
   void connect_tiles();
+  void insert_stacks();
   [[nodiscard]] std::vector<std::vector<BlockRequest>> reach_blocks();
   void make_room();  // for the nodes of all blocks
   void connect_halo();
@@ -126,14 +124,14 @@ class HostEngine final : public Engine {
 
   [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
 
-  // Calls visit(slot, block) for every particle, in storage order; its node is relative to the block.
+  // Calls visit(slot, stack) for every particle, in storage order; its node is relative to that block.
   template <class F>
   void for_each_particle(F&& visit) const {
-    for (const Tile& tile : tiles_) {
-      const BlockCoord block = block_coord(blocks_.keys()[tile.block]);
-      for (std::uint32_t n = 0; n < tile.particles; ++n) visit(tile.first_pack * kLanes + n, block);
+    for (std::size_t t = 0; t < tiles_.size(); ++t) {
+      const BlockCoord stack = block_coord(stacks_[t]);
+      for (std::uint32_t n = 0; n < tiles_[t].particles; ++n) visit(tiles_[t].first_pack * kLanes + n, stack);
     }
-    for (std::uint32_t n = 0; n < lone_.particles; ++n) visit(lone_.first_pack * kLanes + n, lone_block_[n]);
+    for (std::uint32_t n = 0; n < lone_.particles; ++n) visit(lone_.first_pack * kLanes + n, lone_stack_[n]);
   }
   // Of an observation: what the grid says of each slot; empty vectors without a grid.
   struct GridView {
@@ -159,10 +157,12 @@ class HostEngine final : public Engine {
   ParticleStore<P> store_;
   std::vector<float> flaw_thresholds_;
   std::vector<Tile> tiles_;
+  std::vector<BlockKey> stacks_;              // lowest block of each tile
+  std::vector<OccupiedCells> occupied_cells_;  // of each tile at the last sorting
   std::vector<TileBox> boxes_;
   Sweep sweep_;
   LonePacks lone_;
-  std::vector<BlockCoord> lone_block_;
+  std::vector<BlockCoord> lone_stack_;
   std::vector<std::int32_t> lone_node_;  // packed node at the last sorting
   std::vector<LonePull<P>> lone_pull_;
   double kick_ = 0.0;  // of the last grid update [s]

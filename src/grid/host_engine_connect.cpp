@@ -6,34 +6,29 @@
 namespace breccia::grid {
 namespace {
 
-// Per axis, whether a tile reaches the block below (bit 0) and above (bit 1), from the cells its particles are in:
-// stencil and margin reach kTileMargin nodes further.
-template <class P>
-std::array<int, 3> reach(const ParticleStore<P>& store, const Tile& tile) {
-  std::array<int, 3> sides{0, 0, 0};
-  for (std::uint32_t n = 0; n < tile.particles; ++n) {
-    const std::size_t pack = tile.first_pack + n / P::kLanes;
-    const std::int32_t packed = store.kinematics[pack].node[static_cast<int>(n % P::kLanes)];
-    for (int axis = 0; axis < 3; ++axis) {
-      const int cell = ((packed >> (8 * axis)) & 255) - kNodeBias;
-      if (cell < kTileMargin) sides[static_cast<std::size_t>(axis)] |= 1;
-      if (cell >= kBlockWidth - kTileMargin) sides[static_cast<std::size_t>(axis)] |= 2;
-    }
+// Which of the blocks along an axis a tile reaches, from the cells its particles are in: stencil and margin reach
+// kTileMargin nodes further. Bit 0 for the block below the stack.
+unsigned reached_blocks(unsigned cells, int blocks_of_stack) {
+  unsigned reached = 0;
+  for (int slot = 0; slot < blocks_of_stack + 2; ++slot) {
+    const int first = kBlockWidth * (slot - 1) - kTileMargin;  // cells from which a node of the block is reached
+    const int last = first + kBlockWidth + 2 * kTileMargin - 1;
+    const unsigned from = (2U << last) - (1U << std::max(first, 0));
+    if ((cells & from) != 0) reached |= 1U << slot;
   }
-  return sides;
+  return reached;
 }
 
-bool reaches(int sides, int direction) { return direction == 0 || (sides & (direction < 0 ? 1 : 2)) != 0; }
-
-// Calls visit(n, block) for the blocks tile reaches; n as in Tile::neighbours.
-template <class P, class F>
-void for_each_reached(const ParticleStore<P>& store, const Tile& tile, BlockCoord own, const Periodicity& periodicity,
-                      F&& visit) {
-  const std::array<int, 3> sides = reach(store, tile);
-  for (int n = 0; n < 27; ++n) {
-    const int d[3] = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
-    if (!reaches(sides[0], d[0]) || !reaches(sides[1], d[1]) || !reaches(sides[2], d[2])) continue;
-    visit(n, periodicity.wrap({own.x + d[0], own.y + d[1], own.z + d[2]}));
+// Calls visit(n, block) for the blocks a tile reaches; n as in Tile::neighbours, `block` not wrapped.
+template <class F>
+void for_each_reached(const OccupiedCells& cells, BlockKey stack_key, F&& visit) {
+  const unsigned reached[3] = {reached_blocks(cells.axis[0], 1), reached_blocks(cells.axis[1], 1),
+                               reached_blocks(cells.axis[2], kStackBlocks)};
+  const BlockCoord stack = block_coord(stack_key);
+  for (int n = 0; n < kNeighbours; ++n) {
+    const BlockCoord d = neighbour_offset(n);
+    const bool hit = (reached[0] >> (d.x + 1) & reached[1] >> (d.y + 1) & reached[2] >> (d.z + 1) & 1U) != 0;
+    if (hit) visit(n, BlockCoord{stack.x + d.x, stack.y + d.y, stack.z + d.z});
   }
 }
 
@@ -41,18 +36,15 @@ void for_each_reached(const ParticleStore<P>& store, const Tile& tile, BlockCoor
 
 template <class P>
 std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
-  // Which planes of a foreign block a tile in direction d of it, across the slabs, can reach: only those travel.
-  const auto planes = [](int d) { return d < 0 ? 0b1100U : d > 0 ? 0b0011U : 0b1111U; };
   const int axis = slabs_.axis();
-  const int stride = axis == 0 ? 9 : axis == 1 ? 3 : 1;
   std::vector<BlockRequest> foreign;
-  const std::size_t tiles = tiles_.size();
-  for (std::size_t t = 0; t < tiles; ++t) {
-    for_each_reached(store_, tiles_[t], block_coord(blocks_.keys()[t]), periodicity_, [&](int n, BlockCoord b) {
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord there) {
+      const BlockCoord b = periodicity_.wrap(there);
       if (owner(b) == comm_.rank()) {
         blocks_.insert(block_key(b));
       } else {
-        foreign.push_back({block_key(b), planes(n / stride % 3 - 1)});
+        foreign.push_back({block_key(b), planes_in_reach(neighbour_offset(n), axis)});
       }
     });
   }
@@ -70,8 +62,23 @@ std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
 }
 
 template <class P>
+void HostEngine<P>::insert_stacks() {
+  blocks_.clear();
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    tiles_[t].first_block = static_cast<std::uint32_t>(blocks_.size());
+    for_each_reached(occupied_cells_[t], stacks_[t], [&](int, BlockCoord b) {
+      const bool of_stack = stack_of(b) == block_coord(stacks_[t]);
+      if (of_stack && periodicity_.wrap(b) == b && owner(b) == comm_.rank()) blocks_.insert(block_key(b));
+    });
+    tiles_[t].last_block = static_cast<std::uint32_t>(blocks_.size());
+  }
+}
+
+template <class P>
 void HostEngine<P>::connect_tiles() {
-  // Owned blocks first, so that the grid update runs over a contiguous range; blocks of other ranks behind them.
+  // Owned blocks first, so that the grid update runs over a contiguous range, and of these the stacks of the tiles;
+  // blocks of other ranks behind them.
+  insert_stacks();
   block_requests_.ask(reach_blocks(), comm_);
   // Blocks that only other ranks touch must exist here, too.
   for (const auto& requests : block_requests_.by_rank()) {
@@ -83,13 +90,13 @@ void HostEngine<P>::connect_tiles() {
   }
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::fill(std::begin(tiles_[t].neighbours), std::end(tiles_[t].neighbours), kNoBlock);
-    for_each_reached(store_, tiles_[t], block_coord(blocks_.keys()[t]), periodicity_,
-                     [&](int n, BlockCoord b) { tiles_[t].neighbours[n] = blocks_.find(block_key(b)); });
+    for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord b) {
+      tiles_[t].neighbours[n] = blocks_.find(block_key(periodicity_.wrap(b)));
+    });
   }
   connect_halo();
   make_room();
-  sweep_ =
-      plan_sweep(std::span(blocks_.keys()).first(tiles_.size()), is_boundary_, periodicity_.blocks[0], setup_.threads);
+  sweep_ = plan_sweep(stacks_, is_boundary_, periodicity_.blocks[0], setup_.threads);
   boundaries_.find_nodes(std::span(blocks_.keys()).first(owned_blocks_),
                          [&](std::uint32_t b) { return block_sums_[b] == BlockSums::kShared; });
 }
@@ -135,7 +142,7 @@ void HostEngine<P>::connect_halo() {
       }
     }
     ContributionMessages messages = ordered_.connect(
-        tiles_, blocks_, block_sums_, periodicity_.blocks[0], [&](BlockCoord b) { return owner(b); }, comm_);
+        tiles_, stacks_, blocks_, block_sums_, periodicity_.blocks[0], [&](BlockCoord b) { return owner(b); }, comm_);
     sum_exchange_.set(std::move(messages.sent), std::move(messages.received), comm_);
   } else {
     sum_exchange_.set(touched, owned, comm_);

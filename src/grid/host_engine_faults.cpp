@@ -52,7 +52,7 @@ std::optional<ParticleSample> HostEngine<P>::fastest() const {
     for (int axis = 0; axis < 3; ++axis) {
       speed = std::max(speed, std::abs(static_cast<double>(store_.kinematics[pack].velocity[axis][lane])));
       const int place = ((node >> (8 * axis)) & 255) - kNodeBias;
-      outside = outside || place < -1 || place > kBlockWidth;
+      outside = outside || place < -1 || place > tile_extent(axis) - 2 * kTileMargin;
     }
     if (outside) speed = HUGE_VAL;
     if (!(speed > most)) return;

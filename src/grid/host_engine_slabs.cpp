@@ -25,7 +25,8 @@ template <class P>
 void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
   std::array<mpi::PlaneWork, 3> mine;
   for (const Placement& p : placements) {
-    for (std::size_t axis = 0; axis < 3; ++axis) ++mine[axis][p.node[axis] >> 2];
+    const BlockCoord stack = stack_of(block_of(p));
+    for (std::size_t axis = 0; axis < 3; ++axis) ++mine[axis][component(stack, static_cast<int>(axis))];
   }
   // Slabs across the longest extent of the matter share the fewest nodes.
   std::array<mpi::PlaneWork, 3> all;
@@ -43,10 +44,10 @@ mpi::PlaneWork HostEngine<P>::work(std::span<const double> more) const {
   constexpr WorkWeights w = kWeights<P>;
   mpi::PlaneWork work;
   const auto add = [&](BlockCoord block, double cost) { work[component(block, slabs_.axis())] += whole(cost); };
-  for (const Tile& tile : tiles_) {
-    add(block_coord(blocks_.keys()[tile.block]), w.tile + w.pack * packs_for(tile.particles));
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    add(block_coord(stacks_[t]), w.tile + w.pack * packs_for(tiles_[t].particles));
   }
-  for (const BlockCoord block : lone_block_) add(block, w.lone_pack / kLanes);
+  for (const BlockCoord stack : lone_stack_) add(stack, w.lone_pack / kLanes);
   std::size_t n = 0;
   if (more.empty()) return work;
   for_each_particle([&](std::size_t, BlockCoord block) { add(block, more[n++]); });

@@ -1,7 +1,6 @@
 // Sorting: every particle to the rank that owns its block, to its tile, and inside the tile to the order of its cell.
 #include <algorithm>
 #include <cstring>
-#include <numeric>
 #include <string>
 #include <utility>
 
@@ -15,18 +14,19 @@ namespace {
 
 constexpr std::int32_t floor_div4(std::int32_t n) { return n >> 2; }
 
-constexpr BlockCoord block_of(const std::int32_t (&node)[3]) {
-  return {floor_div4(node[0]), floor_div4(node[1]), floor_div4(node[2])};
-}
-
-// Cells of a block in storage order: z slowest, so that consecutive particles write to different rows of nodes.
-constexpr std::uint32_t cell_in_block(const std::int32_t (&node)[3]) {
-  return static_cast<std::uint32_t>(((node[2] & 3) * 4 + (node[1] & 3)) * 4 + (node[0] & 3));
-}
-
-constexpr std::int32_t tile_node(const std::int32_t (&node)[3]) {
-  return ((node[0] & 3) + kNodeBias) | (((node[1] & 3) + kNodeBias) << 8) | (((node[2] & 3) + kNodeBias) << 16);
-}
+// Cells from the lowest of a stack.
+struct CellInStack {
+  int x, y, z;
+  explicit constexpr CellInStack(const std::int32_t (&node)[3])
+      : x(node[0] & (kBlockWidth - 1)), y(node[1] & (kBlockWidth - 1)), z(node[2] & (kStackHeight - 1)) {}
+  // In storage order: z slowest, so that consecutive particles write to different rows of nodes.
+  [[nodiscard]] constexpr std::uint32_t index() const {
+    return static_cast<std::uint32_t>((z * kBlockWidth + y) * kBlockWidth + x);
+  }
+  [[nodiscard]] constexpr std::int32_t packed() const {
+    return (x + kNodeBias) | (y + kNodeBias) << 8 | (z + kNodeBias) << 16;
+  }
+};
 
 using mpi::get;
 using mpi::put;
@@ -36,11 +36,12 @@ using mpi::put;
 template <class P>
 std::vector<Placement> HostEngine<P>::place_all() const {
   std::vector<Placement> placements;
-  for_each_particle([&](std::size_t slot, BlockCoord block) {
+  placements.reserve(store_.packs() * kLanes);
+  for_each_particle([&](std::size_t slot, BlockCoord stack) {
     const std::int32_t packed = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
     Placement p{static_cast<std::uint32_t>(slot), {}};
     for (int axis = 0; axis < 3; ++axis) {
-      const std::int32_t node = kBlockWidth * component(block, axis) + ((packed >> (8 * axis)) & 255) - kNodeBias;
+      const std::int32_t node = kBlockWidth * component(stack, axis) + ((packed >> (8 * axis)) & 255) - kNodeBias;
       const std::int32_t wrapped = periodicity_.wrap(floor_div4(node), axis);
       if (wrapped > kBlockLimit || wrapped < -kBlockLimit) {
         throw NumericsError("particle " + std::to_string(id(slot)) + " is more than 4 million cells from the origin");
@@ -63,7 +64,7 @@ void HostEngine<P>::sort() {
 template <class P>
 void HostEngine<P>::settle(std::vector<Placement> placements) {
   migrate(placements);
-  arrange(separate(std::move(placements)));
+  arrange(placements);
   connect_tiles();
   report_ = {};
   gathers_ = 0;
@@ -77,7 +78,7 @@ void HostEngine<P>::migrate(std::vector<Placement>& placements) {
   std::vector<std::vector<std::byte>> to(static_cast<std::size_t>(comm_.size()));
   std::vector<std::byte> record(bytes);
   std::erase_if(placements, [&](const Placement& p) {
-    const int rank = owner(block_of(p.node));
+    const int rank = owner(block_of(p));
     if (rank == comm_.rank()) return false;
     auto& message = to[static_cast<std::size_t>(rank)];
     put(message, p.node, 3);
@@ -115,64 +116,90 @@ void HostEngine<P>::migrate(std::vector<Placement>& placements) {
   }
 }
 
+// The tile of each block of particles in the order of their stacks, kNoTile where its particle is alone.
 template <class P>
-void HostEngine<P>::arrange(const SortedPlacements& all) {
-  // Tiles as they are met, then in the order of their keys; a counting sort over (tile, cell) is stable.
-  const std::vector<Placement>& placements = all.tiled;
-  blocks_.clear();
-  std::vector<std::uint32_t> met(placements.size());
-  for (std::size_t i = 0; i < placements.size(); ++i) met[i] = blocks_.insert(block_key(block_of(placements[i].node)));
-  const std::vector<BlockKey> keys = blocks_.keys();
-  std::vector<std::uint32_t> by_key(keys.size());
-  std::iota(by_key.begin(), by_key.end(), 0U);
-  std::sort(by_key.begin(), by_key.end(), [&](std::uint32_t a, std::uint32_t b) { return keys[a] < keys[b]; });
-  std::vector<std::uint32_t> rank(keys.size());
-  for (std::uint32_t r = 0; r < by_key.size(); ++r) rank[by_key[r]] = r;
-
-  std::vector<std::uint32_t> place(keys.size() * kBlockNodes, 0U);
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    ++place[rank[met[i]] * kBlockNodes + cell_in_block(placements[i].node)];
+std::vector<std::uint32_t> HostEngine<P>::find_tiles(const Occupancy& occupancy, std::span<const char> lone) {
+  struct Member {
+    BlockKey stack;
+    std::uint32_t block;
+  };
+  std::vector<Member> members;
+  for (std::uint32_t b = 0; b < lone.size(); ++b) {
+    const BlockKey block = occupancy.blocks()[b].block;
+    if (lone[b] == 0) members.push_back({block_key(stack_of(block_coord(block))), b});
   }
-  tiles_.assign(keys.size(), Tile{});
-  boxes_.assign(keys.size(), kWholeTile);
+  std::ranges::sort(members, {}, &Member::stack);
+  std::vector<std::uint32_t> tile_of_block(lone.size(), kNoTile);
+  stacks_.clear();
+  for (const Member& m : members) {
+    if (stacks_.empty() || stacks_.back() != m.stack) stacks_.push_back(m.stack);
+    tile_of_block[m.block] = static_cast<std::uint32_t>(stacks_.size() - 1);
+  }
+  return tile_of_block;
+}
+
+template <class P>
+void HostEngine<P>::arrange(std::span<const Placement> placements) {
+  Occupancy occupancy(placements);
+  const std::vector<char> lone = find_lone(occupancy);
+  const std::vector<std::uint32_t> tile_of_block = find_tiles(occupancy, lone);
+  const auto tile_of = [&](std::size_t i) { return tile_of_block[occupancy.block_of_placement()[i]]; };
+
+  // A counting sort over (tile, cell): it is stable.
+  std::vector<std::uint32_t> place(stacks_.size() * kStackCells, 0U);
+  occupied_cells_.assign(stacks_.size(), OccupiedCells{});
+  std::uint32_t alone = 0;
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    const std::uint32_t t = tile_of(i);
+    if (t == kNoTile) {
+      ++alone;
+      continue;
+    }
+    const CellInStack cell(placements[i].node);
+    ++place[std::size_t{t} * kStackCells + cell.index()];
+    OccupiedCells& occupied = occupied_cells_[t];
+    occupied.axis[0] = static_cast<std::uint16_t>(occupied.axis[0] | 1U << cell.x);
+    occupied.axis[1] = static_cast<std::uint16_t>(occupied.axis[1] | 1U << cell.y);
+    occupied.axis[2] = static_cast<std::uint16_t>(occupied.axis[2] | 1U << cell.z);
+  }
+  tiles_.assign(stacks_.size(), Tile{});
+  boxes_.assign(stacks_.size(), kWholeTile);
   std::uint32_t packs = 0;
-  for (std::uint32_t t = 0; t < tiles_.size(); ++t) {
-    tiles_[t].block = t;
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
     tiles_[t].first_pack = packs;
     std::uint32_t slot = packs * static_cast<std::uint32_t>(kLanes);
-    for (std::uint32_t c = 0; c < kBlockNodes; ++c) {
-      const std::uint32_t count = std::exchange(place[t * kBlockNodes + c], slot);
+    for (std::size_t c = 0; c < kStackCells; ++c) {
+      const std::uint32_t count = std::exchange(place[t * kStackCells + c], slot);
       slot += count;
       tiles_[t].particles += count;
     }
     packs += packs_for(tiles_[t].particles);
   }
-  lone_ = {packs, static_cast<std::uint32_t>(all.lone.size())};
-  packs += packs_for(lone_.particles);
+  lone_ = {packs, alone};
+  packs += packs_for(alone);
 
   std::vector<std::uint32_t> source(packs * kLanes, ParticleStore<P>::kEmpty);
-  std::vector<std::int32_t> node(source.size(), tile_node({0, 0, 0}));
+  std::vector<std::int32_t> node(source.size(), CellInStack({0, 0, 0}).packed());
+  lone_stack_.clear();
+  lone_node_.clear();
   for (std::size_t i = 0; i < placements.size(); ++i) {
-    const std::uint32_t slot = place[rank[met[i]] * kBlockNodes + cell_in_block(placements[i].node)]++;
+    const CellInStack cell(placements[i].node);
+    const std::uint32_t t = tile_of(i);
+    std::size_t slot = lone_.first_pack * kLanes + lone_stack_.size();
+    if (t != kNoTile) {
+      slot = place[std::size_t{t} * kStackCells + cell.index()]++;
+    } else {
+      lone_stack_.push_back(stack_of(block_of(placements[i])));
+      lone_node_.push_back(cell.packed());
+    }
     source[slot] = placements[i].slot;
-    node[slot] = tile_node(placements[i].node);
+    node[slot] = cell.packed();
   }
   if (setup_.numerics.reproducible) sort_cells_by_id(source, place);
-  lone_block_.clear();
-  lone_node_.clear();
-  for (const Placement& p : all.lone) {
-    const std::size_t slot = lone_.first_pack * kLanes + lone_block_.size();
-    source[slot] = p.slot;
-    node[slot] = tile_node(p.node);
-    lone_block_.push_back(block_of(p.node));
-    lone_node_.push_back(node[slot]);
-  }
-  lone_pull_.resize(packs_for(lone_.particles));
+  lone_pull_.resize(packs_for(alone));
   store_.gather(source, setup_.threads);
   for (std::size_t s = 0; s < node.size(); ++s)
     store_.kinematics[s / kLanes].node.set(static_cast<int>(s % kLanes), node[s]);
-  blocks_.clear();
-  for (const std::uint32_t b : by_key) blocks_.insert(keys[b]);
   if (store_.has(Group::kFlaws)) compact_flaws();
 }
 
@@ -181,8 +208,8 @@ void HostEngine<P>::sort_cells_by_id(std::span<std::uint32_t> source, std::span<
   // Else the order would tell from which rank a particle came.
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::size_t first = tiles_[t].first_pack * kLanes;
-    for (std::size_t c = 0; c < kBlockNodes; ++c) {
-      const std::size_t last = cell_ends[t * kBlockNodes + c];
+    for (std::size_t c = 0; c < kStackCells; ++c) {
+      const std::size_t last = cell_ends[t * kStackCells + c];
       const auto cell = source.subspan(first, last - first);
       if (cell.size() > 1) std::ranges::sort(cell, {}, [&](std::uint32_t slot) { return id(slot); });
       first = last;
@@ -192,6 +219,7 @@ void HostEngine<P>::sort_cells_by_id(std::span<std::uint32_t> source, std::span<
 
 template <class P>
 void HostEngine<P>::compact_flaws() {
+  if (comm_.size() == 1) return;  // none has gone
   std::size_t live = 0;
   for_each_particle([&](std::size_t slot, BlockCoord) {
     live += static_cast<std::size_t>(store_.flaws[slot / kLanes].count[static_cast<int>(slot % kLanes)] >> 16);

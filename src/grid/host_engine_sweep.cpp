@@ -15,13 +15,21 @@ void HostEngine<P>::run_task(const SweepTask& task, const PassArguments<P>& argu
     for (std::uint32_t n = step.first; n < step.last; ++n) {
       if (!step.update) {
         const std::uint32_t tile = sweep_.order[n];
-        kernels_.pass(arguments, tile, reports[tile]);
+        const std::uint32_t next = n + 1 < step.last ? sweep_.order[n + 1] : kNoTile;
+        kernels_.pass(arguments, tile, next, reports[tile]);
         if (n % kStretch == 0) progress(trailing);
-      } else if (trailing != nullptr && block_sums_[n] == BlockSums::kInPlace) {
-        // Block n is that of tile n. What other ranks add to waits for them.
-        kernels_.update_blocks(*trailing, n, n + 1);
+      } else if (trailing != nullptr) {
+        update_stack(tiles_[n], *trailing);
       }
     }
+  }
+}
+
+template <class P>
+void HostEngine<P>::update_stack(const Tile& tile, const NodeArguments<P>& arguments) {
+  for (std::uint32_t b = tile.first_block; b < tile.last_block; ++b) {
+    // What other ranks add to waits for them.
+    if (block_sums_[b] == BlockSums::kInPlace) kernels_.update_blocks(arguments, b, b + 1);
   }
 }
 

@@ -30,9 +30,9 @@ BRECCIA_HD void specialised(const material::RuntimeEffects& fx, F&& run) {
 }
 
 template <class P>
-void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
+void pass(const PassArguments<P>& a, std::uint32_t tile, std::uint32_t next, TileReport& report) {
   specialised(a.effects,
-              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, scratch<P>(), tile, report); });
+              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, scratch<P>(), tile, next, report); });
 }
 
 template <class P>
@@ -71,28 +71,44 @@ void lone_probe(const ProbeArguments<P>& a) {
   probe_lone(a);
 }
 
-// [p f m 0] to [p/m f/m 1 0] to [v_new v_old m 0].
+// [p f m 0] to [p/m f/m 1 0] to [v_new v_old m 0], of one node or of two that lie beside each other.
+template <class N, class Real>
+BRECCIA_HD N node_velocities(N sums, N inverse_mass, Real kick) {
+  const N per_mass = sums * inverse_mass;
+  const N velocity = rearranged<0, 1, 2, 0, 1, 2, 7, 7>(per_mass);
+  const N acceleration = rearranged<3, 4, 5, 7, 7, 7, 7, 7>(per_mass);
+  const N mass_alone = rearranged<7, 7, 7, 7, 7, 7, 6, 7>(sums);
+  return velocity + N(kick) * acceleration + mass_alone;
+}
+
+// A register's worth of nodes from `first` on. Those without mass are at rest.
 template <class P>
-BRECCIA_HD Node<P> node_velocities(Node<P> sums, typename P::Real mass, typename P::Real kick) {
+BRECCIA_HD void update_nodes_at(const NodeArguments<P>& a, std::size_t first) {
   using Real = typename P::Real;
-  const Node<P> per_mass = sums * Node<P>(Real(1) / mass);
-  const Node<P> velocity = rearranged<0, 1, 2, 0, 1, 2, 7, 7>(per_mass);
-  const Node<P> acceleration = rearranged<3, 4, 5, 7, 7, 7, 7, 7>(per_mass);
-  const Node<P> mass_alone = rearranged<7, 7, 7, 7, 7, 7, 6, 7>(sums);
-  return velocity + Node<P>(kick) * acceleration + mass_alone;
+  Real* sums = a.sums + first * kChannels;
+  Real* velocities = a.velocities + first * kChannels;
+  if constexpr (kNodePairs<P>) {
+    using N = Pack<Real, 2 * kChannels>;
+    const N values = N::load(sums);
+    N(Real(0)).store(sums);
+    const N mass = rearranged<6, 6, 6, 6, 6, 6, 6, 6>(values);
+    // Lanes of an empty node may be anything until the selection.
+    select(mass > N(a.smallest_mass), node_velocities(values, N(Real(1)) / mass, a.kick), N(Real(0))).store(velocities);
+  } else {
+    using N = Node<P>;
+    const Real mass = sums[kMass];
+    const N values = N::load(sums);
+    N(Real(0)).store(sums);
+    const N moving =
+        mass > a.smallest_mass ? node_velocities(values, N(Real(1) / mass), a.kick) : N(Real(0));
+    moving.store(velocities);
+  }
 }
 
 template <class P>
 BRECCIA_HD void update_nodes(const NodeArguments<P>& a, std::size_t first, std::size_t count) {
-  using N = Node<P>;
-  for (std::size_t n = first; n < first + count; ++n) {
-    typename P::Real* sums = a.sums + n * kChannels;
-    const typename P::Real mass = sums[kMass];
-    const N values = N::load(sums);
-    N(typename P::Real(0)).store(sums);
-    const N velocities = mass > a.smallest_mass ? node_velocities<P>(values, mass, a.kick) : N(typename P::Real(0));
-    velocities.store(a.velocities + n * kChannels);
-  }
+  constexpr std::size_t kAtOnce = kNodePairs<P> ? 2 : 1;
+  for (std::size_t n = first; n < first + count; n += kAtOnce) update_nodes_at(a, n);
 }
 
 template <class P>

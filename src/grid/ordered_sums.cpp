@@ -1,6 +1,7 @@
 #include "grid/ordered_sums.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <tuple>
 #include <utility>
 
@@ -9,23 +10,22 @@
 namespace breccia::grid {
 namespace {
 
-// Nodes of a block that a tile in direction d of it, along one axis, can reach: first and last.
+// Nodes of a neighbour that a tile can reach along an axis: first and last.
 struct Range {
   std::uint32_t first, last;
+  explicit Range(unsigned planes)
+      : first(static_cast<std::uint32_t>(std::countr_zero(planes))),
+        last(static_cast<std::uint32_t>(std::bit_width(planes)) - 1U) {}
 };
-Range reached(int direction) {
-  if (direction < 0) return {kBlockWidth - kTileMargin, kBlockWidth - 1};
-  return {0, direction > 0 ? kTileMargin - 1U : kBlockWidth - 1U};
-}
 
 struct Reach {
   Range x, y, z;
-  explicit Reach(std::int32_t neighbour)
-      : x(reached(neighbour / 9 - 1)), y(reached(neighbour / 3 % 3 - 1)), z(reached(neighbour % 3 - 1)) {}
+  explicit Reach(BlockCoord offset)
+      : x(planes_in_reach(offset, 0)), y(planes_in_reach(offset, 1)), z(planes_in_reach(offset, 2)) {}
 };
 
 void append_nodes(std::vector<std::uint32_t>& nodes, std::uint32_t block, std::int32_t neighbour) {
-  const Reach r(neighbour);
+  const Reach r(neighbour_offset(neighbour));
   for (std::uint32_t x = r.x.first; x <= r.x.last; ++x) {
     for (std::uint32_t y = r.y.first; y <= r.y.last; ++y) {
       for (std::uint32_t z = r.z.first; z <= r.z.last; ++z) nodes.push_back(block * kBlockNodes + 16 * x + 4 * y + z);
@@ -34,7 +34,7 @@ void append_nodes(std::vector<std::uint32_t>& nodes, std::uint32_t block, std::i
 }
 
 RowMask rows_of(std::int32_t neighbour) {
-  const Reach r(neighbour);
+  const Reach r(neighbour_offset(neighbour));
   RowMask rows;
   for (std::uint32_t x = r.x.first; x <= r.x.last; ++x) {
     for (std::uint32_t y = r.y.first; y <= r.y.last; ++y) {

@@ -24,7 +24,7 @@ enum class BlockSums : std::uint8_t {
 
 /// What a tile gives to a block.
 struct Contribution {
-  BlockKey tile;
+  BlockKey tile;  ///< lowest block of its stack
   BlockKey block;
   std::int32_t neighbour;  ///< index of the block in Tile::neighbours
   std::int32_t turn;       ///< of the tile
@@ -40,17 +40,17 @@ struct ContributionMessages {
 class OrderedSums {
  public:
   /// Gives tiles that reach blocks of other ranks, shared or collected blocks blocks of their own to add to, stored
-  /// behind those of `blocks`. `owner(block)` is a rank; `period` as in sweep_plan.hpp. Collective.
+  /// behind those of `blocks`. `stacks`: their lowest blocks; `owner(block)` is a rank; `period` as in sweep_plan.hpp. Collective.
   template <class Owner>
-  ContributionMessages connect(std::span<const Tile> tiles, const BlockTable& blocks, std::span<const BlockSums> owned,
-                               std::int32_t period, Owner&& owner, const mpi::Comm& comm) {
+  ContributionMessages connect(std::span<const Tile> tiles, std::span<const BlockKey> stacks, const BlockTable& blocks,
+                               std::span<const BlockSums> owned, std::int32_t period, Owner&& owner,
+                               const mpi::Comm& comm) {
     begin(tiles, blocks, comm.size());
     for (std::uint32_t t = 0; t < tiles.size(); ++t) {
-      for (int n = 0; n < 27; ++n) {
+      for (int n = 0; n < kNeighbours; ++n) {
         const std::uint32_t block = tiles[t].neighbours[n];
         if (block == kNoBlock || (block < owned.size() && owned[block] == BlockSums::kInPlace)) continue;
-        const BlockKey tile = blocks.keys()[t];
-        const Contribution c{tile, blocks.keys()[block], n, sweep_turn_of(tile, period)};
+        const Contribution c{stacks[t], blocks.keys()[block], n, sweep_turn_of(stacks[t], period)};
         add(t, block, c, block < owned.size() ? comm.rank() : owner(block_coord(c.block)), comm.rank());
       }
     }

@@ -1,5 +1,6 @@
 #include "grid/particles.hpp"
 
+#include <algorithm>
 #include <cstring>
 #include <vector>
 
@@ -27,40 +28,99 @@ void gather_components(const std::byte* const (&lane)[kLanes], std::byte* to, in
   }
 }
 
-// The packs of one group of fields, each slot s from source[s].
-template <class P, class T>
-LargeArray<T> gathered(const LargeArray<T>& old, std::span<const std::uint32_t> source, Group group, int threads) {
+// One pack of a group, each lane from source[lane]. `old(pack)` is where a pack of before is found.
+template <class P, class T, class F>
+void gather_pack(std::span<const std::uint32_t, P::kLanes> source, std::span<const FieldDescriptor> table, F&& old,
+                 T& pack) {
   constexpr std::size_t kLanes = P::kLanes;
   static const T kNothing{};  // of an empty lane
+  const T* from[kLanes];
+  std::size_t from_lane[kLanes];
+  for (std::size_t l = 0; l < kLanes; ++l) {
+    const std::uint32_t s = source[l];
+    from[l] = s == ParticleStore<P>::kEmpty ? &kNothing : old(s / kLanes);
+    from_lane[l] = s % kLanes;
+  }
+  for (const FieldDescriptor& field : table) {
+    const auto element = static_cast<std::size_t>(field.element_bytes);
+    const std::byte* lane[kLanes];
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      lane[l] = reinterpret_cast<const std::byte*>(from[l]) + field.offset + from_lane[l] * element;
+    }
+    std::byte* to = reinterpret_cast<std::byte*>(&pack) + field.offset;
+    if (element == sizeof(std::uint32_t)) {
+      gather_components<std::uint32_t>(lane, to, field.components);
+    } else {
+      gather_components<std::uint64_t>(lane, to, field.components);
+    }
+  }
+}
+
+// How far from its new place, in packs, a particle lies at most.
+struct Displacement {
+  std::size_t back = 0;   // before it
+  std::size_t ahead = 0;  // behind it
+};
+
+template <class P>
+Displacement displacement_of(std::span<const std::uint32_t> source) {
+  Displacement d;
+  for (std::size_t s = 0; s < source.size(); ++s) {
+    if (source[s] == ParticleStore<P>::kEmpty) continue;
+    const std::size_t to = s / P::kLanes;
+    const std::size_t from = source[s] / P::kLanes;
+    if (from < to) d.back = std::max(d.back, to - from);
+    if (from > to) d.ahead = std::max(d.ahead, from - to);
+  }
+  return d;
+}
+
+// A stretch of packs that is rearranged in place, front to back: what is overwritten before it is needed waits in a
+// ring, and what the stretch behind this one overwrites is set aside before.
+template <class P, class T>
+class Stretch {
+ public:
+  Stretch(const LargeArray<T>& packs, std::size_t first, std::size_t last, Displacement d)
+      : first_(first), last_(last), ring_(d.back + 1) {
+    for (std::size_t p = first > d.back ? first - d.back : 0; p < first; ++p) ring_[p % ring_.size()] = packs[p];
+    const std::size_t end = std::min(last + d.ahead, packs.size());
+    if (end > last) behind_.assign(packs.data() + last, packs.data() + end);
+  }
+
+  void rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> source, std::span<const FieldDescriptor> table) {
+    for (std::size_t p = first_; p < last_; ++p) {
+      ring_[p % ring_.size()] = packs[p];
+      const auto old = [&](std::size_t q) {
+        return q <= p ? &ring_[q % ring_.size()] : q < last_ ? &packs[q] : &behind_[q - last_];
+      };
+      gather_pack<P>(source.subspan(p * P::kLanes).template first<P::kLanes>(), table, old, packs[p]);
+    }
+  }
+
+ private:
+  std::size_t first_, last_;
+  LargeArray<T> ring_;
+  LargeArray<T> behind_;
+};
+
+// The packs of one group of fields, each slot s from source[s].
+template <class P, class T>
+void rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> source, Group group, Displacement d, int threads) {
   std::vector<FieldDescriptor> table;
   for (const FieldDescriptor& field : fields<P>()) {
     if (field.group == group) table.push_back(field);
   }
-  LargeArray<T> result(source.size() / kLanes);
-#pragma omp parallel for schedule(static) num_threads(threads)
-  for (std::size_t pack = 0; pack < result.size(); ++pack) {
-    const T* from[kLanes];
-    std::size_t from_lane[kLanes];
-    for (std::size_t l = 0; l < kLanes; ++l) {
-      const std::uint32_t s = source[pack * kLanes + l];
-      from[l] = s == ParticleStore<P>::kEmpty ? &kNothing : old.data() + s / kLanes;
-      from_lane[l] = s % kLanes;
-    }
-    for (const FieldDescriptor& field : table) {
-      const auto element = static_cast<std::size_t>(field.element_bytes);
-      const std::byte* lane[kLanes];
-      for (std::size_t l = 0; l < kLanes; ++l) {
-        lane[l] = reinterpret_cast<const std::byte*>(from[l]) + field.offset + from_lane[l] * element;
-      }
-      std::byte* to = reinterpret_cast<std::byte*>(result.data() + pack) + field.offset;
-      if (element == sizeof(std::uint32_t)) {
-        gather_components<std::uint32_t>(lane, to, field.components);
-      } else {
-        gather_components<std::uint64_t>(lane, to, field.components);
-      }
-    }
-  }
-  return result;
+  const std::size_t after = source.size() / P::kLanes;
+  const std::size_t most = std::max(after, packs.size());
+  // Some room for the next sortings, not twice as much as push_back would take.
+  if (most > packs.capacity()) packs.reserve(most + most / 16);
+  packs.resize(most);
+  const auto count = static_cast<std::size_t>(threads);
+  std::vector<Stretch<P, T>> stretches;
+  for (std::size_t n = 0; n < count; ++n) stretches.emplace_back(packs, n * after / count, (n + 1) * after / count, d);
+#pragma omp parallel for schedule(static, 1) num_threads(threads)
+  for (std::size_t n = 0; n < count; ++n) stretches[n].rearrange(packs, source, table);
+  packs.resize(after);
 }
 
 template <class P>
@@ -209,7 +269,8 @@ std::size_t ParticleStore<P>::bytes_per_particle(const GroupSet& groups) {
 
 template <class P>
 void ParticleStore<P>::gather(std::span<const std::uint32_t> source, int threads) {
-  for_each_group([&](Group group, auto& array) { array = gathered<P>(array, source, group, threads); });
+  const Displacement d = displacement_of<P>(source);
+  for_each_group([&](Group group, auto& array) { rearrange<P>(array, source, group, d, threads); });
 }
 
 template <class P>

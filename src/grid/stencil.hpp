@@ -11,7 +11,7 @@ BRECCIA_HD Pack<float, 16> offset_in_cells(Pack<std::int32_t, 16> offset) {
 }
 BRECCIA_HD Pack<double, 8> offset_in_cells(Pack<double, 8> offset) { return offset; }
 
-/// Coordinate of the nearest node along an axis, 0 .. 5 inside the margin: the first node of the stencil in the tile.
+/// First node of the stencil along an axis in the tile, from 0 inside the margin.
 template <int W>
 BRECCIA_HD Pack<std::int32_t, W> stencil_start(Pack<std::int32_t, W> node, int axis) {
   using I = Pack<std::int32_t, W>;
@@ -60,7 +60,7 @@ struct Stencil {
       store(Weights(offset[2]), weight_z);
     }
     const I first = kNodePairs<P> ? z & I(~1) : z;
-    select(outside(p), I(0), p.axis[0] * I(kTilePlane) + p.axis[1] * I(kTileWidth) + first).store(start);
+    select(outside(p), I(0), p.axis[0] * I(kTilePlane) + p.axis[1] * I(kTileHeight) + first).store(start);
     return p;
   }
 
@@ -68,7 +68,7 @@ struct Stencil {
   BRECCIA_HD static typename P::IntPack::Mask outside(const Place& place) {
     using I = typename P::IntPack;
     const I low = min(min(place.axis[0], place.axis[1]), place.axis[2]);
-    const I high = max(max(place.axis[0], place.axis[1]), place.axis[2]);
+    const I high = max(max(place.axis[0], place.axis[1]), place.axis[2] - I(kTileHeight - kTileWidth));
     return (low < I(0)) | (high > I(kTileWidth - 3));
   }
 
@@ -119,7 +119,7 @@ class BoxOfStencils {
   using I = typename P::IntPack;
 
  public:
-  BRECCIA_HD BoxOfStencils() : low_{I(kTileWidth), I(kTileWidth), I(kTileWidth)}, high_{I(-1), I(-1), I(-1)} {}
+  BRECCIA_HD BoxOfStencils() : low_{I(kTileHeight), I(kTileHeight), I(kTileHeight)}, high_{I(-1), I(-1), I(-1)} {}
 
   /// Empty lanes have mass 0 and do not count.
   BRECCIA_HD void add(const typename Stencil<P>::Place& place, typename P::RealPack mass) {
@@ -135,14 +135,15 @@ class BoxOfStencils {
   [[nodiscard]] BRECCIA_HD TileBox box() const {
     TileBox b;
     for (int axis = 0; axis < 3; ++axis) {
-      int low = kTileWidth - 3;
+      const int last = tile_extent(axis) - 3;
+      int low = last;
       int high = 0;
       for (int l = 0; l < P::kLanes; ++l) {
         low = low_[axis][l] < low ? low_[axis][l] : low;
         high = high_[axis][l] > high ? high_[axis][l] : high;
       }
       b.low[axis] = static_cast<std::int8_t>(low < 0 ? 0 : low);
-      b.high[axis] = static_cast<std::int8_t>((high > kTileWidth - 3 ? kTileWidth - 3 : high) + 2);
+      b.high[axis] = static_cast<std::int8_t>((high > last ? last : high) + 2);
     }
     return b;
   }

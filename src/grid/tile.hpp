@@ -1,4 +1,4 @@
-// The tile: the particles of one block and the 8x8x8 nodes they can reach. Plain data shared by the engine and the
+// The tile: the particles of a stack of blocks and the nodes they can reach. Plain data shared by the engine and the
 // kernel files.
 #pragma once
 
@@ -10,13 +10,43 @@
 
 namespace breccia::grid {
 
+/// Blocks of a stack, along z. Along z nodes are taken by aligned pairs, so that one block would be a fourth of waste.
+inline constexpr int kStackBlocks = 4;
+inline constexpr int kStackHeight = kStackBlocks * kBlockWidth;  ///< nodes of a stack along z
+inline constexpr int kStackCells = kStackBlocks * kBlockNodes;
+inline constexpr int kTileHeight = kStackHeight + 2 * kTileMargin;  ///< nodes of a tile along z; kTileWidth along x, y
+
+/// Lowest block of the stack that a block belongs to.
+constexpr BlockCoord stack_of(BlockCoord b) { return {b.x, b.y, b.z & ~(kStackBlocks - 1)}; }
+
 /// Nodes from one plane x = const of a tile to the next: two more than it holds, since rows that lie 4096 bytes apart
 /// make loads wait for stores they have nothing to do with.
-inline constexpr int kTilePlane = kTileWidth * kTileWidth + 2;
+inline constexpr int kTilePlane = kTileWidth * kTileHeight + 2;
 inline constexpr int kTileNodes = kTileWidth * kTilePlane;
 
-/// Index of a node in a tile, coordinates 0 .. 7.
-constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTileWidth + z; }
+/// Nodes of a tile along an axis.
+constexpr int tile_extent(int axis) { return axis == 2 ? kTileHeight : kTileWidth; }
+
+/// Index of a node in a tile, coordinates 0 .. 7, along z 0 .. 11.
+constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTileHeight + z; }
+
+/// The blocks around and of a stack, x slowest.
+inline constexpr int kNeighboursAlongZ = kStackBlocks + 2;
+inline constexpr int kNeighbours = 3 * 3 * kNeighboursAlongZ;
+
+/// Where neighbour n lies, in blocks from the lowest of the stack.
+constexpr BlockCoord neighbour_offset(int n) {
+  return {n / (3 * kNeighboursAlongZ) - 1, n / kNeighboursAlongZ % 3 - 1, n % kNeighboursAlongZ - 1};
+}
+
+/// Which planes of a neighbour, of its four along an axis, a tile can reach: bit 0 for the lowest.
+constexpr unsigned planes_in_reach(BlockCoord offset, int axis) {
+  constexpr unsigned kAll = (1U << kBlockWidth) - 1;
+  const std::int32_t d = component(offset, axis);
+  const std::int32_t above = axis == 2 ? kStackBlocks : 1;
+  if (d < 0) return kAll & ~(kAll >> kTileMargin);
+  return d >= above ? kAll >> (kBlockWidth - kTileMargin) : kAll;
+}
 
 /// Which rows along z of a block hold something: bit 4 x + y of half 0 for x = 0, 1, and 4 (x - 2) + y of half 1. Tiles
 /// on both sides of a block may mark it at the same time, each its own half.
@@ -33,11 +63,14 @@ enum VelocityChannel { kNewVelocity = 0, kOldVelocity = 3 };  // kMass stays whe
 template <class P>
 using Node = Pack<typename P::Real, kChannels>;
 
+inline constexpr std::uint32_t kNoTile = 0xffffffffU;
+
 struct Tile {
-  std::uint32_t block = 0;  ///< index of its own block
   std::uint32_t first_pack = 0;
   std::uint32_t particles = 0;
-  std::uint32_t neighbours[27];  ///< block indices, x slowest; kNoBlock where it reaches no node
+  std::uint32_t first_block = 0;  ///< of the blocks of its stack that it reaches and this rank owns
+  std::uint32_t last_block = 0;
+  std::uint32_t neighbours[kNeighbours];  ///< block indices; kNoBlock where it reaches no node
 };
 
 /// The nodes that the particles of a tile touched in their last scatter, first and last of each axis.
@@ -46,7 +79,7 @@ struct TileBox {
   std::int8_t high[3];
 };
 
-inline constexpr TileBox kWholeTile{{0, 0, 0}, {kTileWidth - 1, kTileWidth - 1, kTileWidth - 1}};
+inline constexpr TileBox kWholeTile{{0, 0, 0}, {kTileWidth - 1, kTileWidth - 1, kTileHeight - 1}};
 
 /// Packs of particles that no other particle can meet before the next sorting (lone_pass.hpp). They follow the tiles.
 struct LonePacks {
@@ -162,7 +195,8 @@ struct NodeArguments {
 /// The entry points one instruction set provides.
 template <class P>
 struct Kernels {
-  void (*pass)(const PassArguments<P>&, std::uint32_t tile, TileReport&);
+  /// `next`: the tile after it, whose nodes are asked for ahead, or kNoTile.
+  void (*pass)(const PassArguments<P>&, std::uint32_t tile, std::uint32_t next, TileReport&);
   void (*probe)(const ProbeArguments<P>&, std::uint32_t tile);
   /// The same for the lone packs first .. last-1, counted from 0.
   void (*lone_pass)(const PassArguments<P>&, std::uint32_t first, std::uint32_t last, TileReport&);

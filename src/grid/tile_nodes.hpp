@@ -1,4 +1,4 @@
-// Copies between blocks and the 8x8x8 nodes of a tile that stay in the first-level cache. Only the box that particles
+// Copies between blocks and the nodes of a tile that stay in the first-level cache. Only the box that particles
 // touch is copied, along z by pairs of nodes: a pair is a cache line in mixed precision and never crosses blocks.
 #pragma once
 
@@ -8,13 +8,13 @@ namespace breccia::grid {
 
 namespace detail {
 
-inline constexpr int kPairs = kTileWidth / 2;
-/// Which of the three blocks along z holds a pair of tile nodes, and where in it.
-inline constexpr int kPairBlock[kPairs] = {0, 1, 1, 2};
-inline constexpr int kPairStart[kPairs] = {kBlockWidth - kTileMargin, 0, 2, 0};
-static_assert(kTileMargin == 2 && kBlockWidth == 4, "the tables above hold for these");
+inline constexpr int kPairs = kTileHeight / 2;
+/// Which of the blocks along z holds pair p of tile nodes, and where in it.
+constexpr int pair_block(int p) { return (2 * p + kBlockWidth - kTileMargin) / kBlockWidth; }
+constexpr int pair_start(int p) { return (2 * p + kBlockWidth - kTileMargin) % kBlockWidth; }
+static_assert(kTileMargin % 2 == 0 && kBlockWidth % 2 == 0, "no pair crosses blocks");
 
-/// The part of a box that lies in three blocks above each other.
+/// The part of a box that lies in blocks above each other.
 struct Column {
   const std::uint32_t* blocks;  ///< along z
   int in_block;                 ///< first node of the first row, in a block
@@ -37,7 +37,7 @@ BRECCIA_HD void for_each_column(const Tile& tile, const TileBox& box, F&& visit)
       const int y = box.low[1] > kFirst[by] ? box.low[1] : kFirst[by];
       const int rows_y = (box.high[1] < kLast[by] ? box.high[1] : kLast[by]) - y + 1;
       const int row = (x - kFirst[bx] + kStart[bx]) * kBlockWidth + (y - kFirst[by] + kStart[by]);
-      visit(Column{tile.neighbours + (bx * 3 + by) * 3, row * kBlockWidth, tile_index(x, y, 0), rows_x, rows_y});
+      visit(Column{tile.neighbours + (bx * 3 + by) * kNeighboursAlongZ, row * kBlockWidth, tile_index(x, y, 0), rows_x, rows_y});
     }
   }
 }
@@ -75,8 +75,8 @@ struct PairStarts {
   Real* pair[kPairs];
   BRECCIA_HD PairStarts(const Column& column, Real* blocks, Real* instead) {
     for (int p = 0; p < kPairs; ++p) {
-      const std::uint32_t block = column.blocks[kPairBlock[p]];
-      const int node = column.in_block + kPairStart[p];
+      const std::uint32_t block = column.blocks[pair_block(p)];
+      const int node = column.in_block + pair_start(p);
       pair[p] = block == kNoBlock ? instead + node * kChannels : blocks + at(block, node);
     }
   }
@@ -112,7 +112,7 @@ template <class P>
   bool unknown = false;
   detail::for_each_column(tile, box, [&](const detail::Column& column) BRECCIA_INLINE_LAMBDA {
     const detail::PairStarts<typename P::Real> to(column, blocks, beyond);
-    for (int bz = 0; bz < 3; ++bz) unknown = unknown || column.blocks[bz] == kNoBlock;
+    for (int bz = 0; bz < kNeighboursAlongZ; ++bz) unknown = unknown || column.blocks[bz] == kNoBlock;
     detail::for_each_pair(column, box, [&](int in_block, int in_tile, int p) BRECCIA_INLINE_LAMBDA {
       typename P::Real* sum = to.pair[p] + in_block * kChannels;
       typename P::Real* node = nodes + (column.in_tile + in_tile + 2 * p) * kChannels;
@@ -128,6 +128,60 @@ template <class P>
   return lost;
 }
 
+/// Asks for the nodes of a tile ahead of their use, a few rows at a time: all at once would fill the buffers that wait
+/// for memory.
+template <class P>
+class TilePrefetch {
+ public:
+  /// Null tile: nothing.
+  BRECCIA_HD TilePrefetch(const Tile* tile, const TileBox* box, const typename P::Real* velocities,
+                          const typename P::Real* sums)
+      : tile_(tile), velocities_(velocities), sums_(sums) {
+    if (tile == nullptr) return;
+    box_ = *box;
+    // The nearer half along y is still there from the tiles before.
+    if (box_.low[1] < kTileWidth / 2) box_.low[1] = kTileWidth / 2;
+    x_ = box_.low[0];
+    y_ = box_.low[1];
+    const int along_y = box_.high[1] - box_.low[1] + 1;
+    left_ = along_y > 0 ? (box_.high[0] - box_.low[0] + 1) * along_y : 0;
+  }
+
+  BRECCIA_HD void rows(int count) {
+    for (; count > 0 && left_ > 0; --count, --left_) {
+      row();
+      if (++y_ > box_.high[1]) {
+        y_ = box_.low[1];
+        ++x_;
+      }
+    }
+  }
+
+ private:
+  BRECCIA_HD void row() const {
+    constexpr int kShift = kBlockWidth - kTileMargin;
+    const int x = x_ + kShift;
+    const int y = y_ + kShift;
+    const std::uint32_t* blocks = tile_->neighbours + (x / kBlockWidth * 3 + y / kBlockWidth) * kNeighboursAlongZ;
+    const int node = (x % kBlockWidth * kBlockWidth + y % kBlockWidth) * kBlockWidth;
+    for (int p = box_.low[2] / 2; p <= box_.high[2] / 2; ++p) {
+      const std::uint32_t block = blocks[detail::pair_block(p)];
+      if (block == kNoBlock) continue;
+      const std::size_t first = detail::at(block, node + detail::pair_start(p));
+      __builtin_prefetch(velocities_ + first, 0, 2);
+      __builtin_prefetch(sums_ + first, 1, 2);
+    }
+  }
+
+  const Tile* tile_;
+  const typename P::Real* velocities_;
+  const typename P::Real* sums_;
+  TileBox box_{};
+  int x_ = 0;
+  int y_ = 0;
+  int left_ = 0;
+};
+
 /// Marks the rows of the blocks that a box reaches.
 BRECCIA_HD void mark_rows(const Tile& tile, const TileBox& box, RowMask* rows) {
   // Nodes of a tile to those of the block below, its own and the one above, four bits each.
@@ -140,8 +194,8 @@ BRECCIA_HD void mark_rows(const Tile& tile, const TileBox& box, RowMask* rows) {
     const unsigned spread = (x & 1U) | (x & 2U) << 3 | (x & 4U) << 6 | (x & 8U) << 9;
     for (int by = 0; by < 3; ++by) {
       const unsigned mask = spread * touched(1, by);
-      for (int bz = 0; bz < 3; ++bz) {
-        const std::uint32_t block = tile.neighbours[(bx * 3 + by) * 3 + bz];
+      for (int bz = 0; bz < kNeighboursAlongZ; ++bz) {
+        const std::uint32_t block = tile.neighbours[(bx * 3 + by) * kNeighboursAlongZ + bz];
         if (block == kNoBlock || touched(2, bz) == 0) continue;
         for (int h = 0; h < 2; ++h) {
           std::uint8_t& half = rows[block].half[h];
