@@ -26,7 +26,7 @@ struct SortedPlacements {
   std::vector<Placement> lone;
 };
 
-/// Nodes of a block that a rank asks the owner for: bit n for the plane n across the slabs.
+/// Nodes of a block that a rank asks their owner for: bit n for the plane n across the slabs.
 struct BlockRequest {
   BlockKey key;
   std::uint32_t planes;
@@ -109,6 +109,8 @@ class HostEngine final : public Engine {
   void arrange(const SortedPlacements& placements);
   void connect_tiles();
   [[nodiscard]] std::vector<std::vector<BlockRequest>> reach_blocks();
+  // Of the block in this direction, across the slabs, from the one at `own`: the planes that particles in that one reach.
+  [[nodiscard]] std::uint32_t reached_planes(BlockCoord own, int direction) const;
   void make_room();  // for the nodes of all blocks
   void connect_halo();
   [[nodiscard]] std::vector<mpi::SharedNodes> nodes_of(const std::vector<std::vector<BlockRequest>>& requests) const;
@@ -124,7 +126,16 @@ class HostEngine final : public Engine {
   // The flaws of list `row` become those of `slot`; the first `active` of them grow already.
   void set_flaws(std::size_t slot, const material::FlawLists& flaws, std::size_t row, std::uint32_t active);
 
-  [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
+  // Slabs. Planes are those of nodes across the slabs; sets of the four of a block have bit n for its plane n.
+  [[nodiscard]] int owner(const Placement& p) const { return slabs_.owner(p.node[slabs_.axis()]); }
+  [[nodiscard]] std::int32_t first_plane(BlockCoord block) const {
+    return kBlockWidth * component(block, slabs_.axis());
+  }
+  [[nodiscard]] std::uint32_t own_planes(BlockCoord block) const;
+  static constexpr std::uint32_t kAllPlanes = 0b1111;
+  [[nodiscard]] std::size_t plane_in_block(std::size_t slot) const;  // of a particle's node, just after a sorting
+  // Ordered sums are those of whole tiles.
+  [[nodiscard]] bool divides_blocks() const { return setup_.divide_blocks && !setup_.numerics.reproducible; }
 
   // Calls visit(slot, block) for every particle, in storage order; its node is relative to the block.
   template <class F>

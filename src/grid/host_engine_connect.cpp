@@ -37,41 +37,64 @@ void for_each_reached(const ParticleStore<P>& store, const Tile& tile, BlockCoor
   }
 }
 
+// One request for each block, in the order of their keys.
+void merge(std::vector<BlockRequest>& requests) {
+  std::sort(requests.begin(), requests.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
+  std::vector<BlockRequest> merged;
+  for (const BlockRequest& request : requests) {
+    if (merged.empty() || merged.back().key != request.key) {
+      merged.push_back(request);
+    } else {
+      merged.back().planes |= request.planes;
+    }
+  }
+  requests = std::move(merged);
+}
+
 }  // namespace
 
 template <class P>
 std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
-  // Which planes of a foreign block a tile in direction d of it, across the slabs, can reach: only those travel.
-  const auto planes = [](int d) { return d < 0 ? 0b1100U : d > 0 ? 0b0011U : 0b1111U; };
   const int axis = slabs_.axis();
   const int stride = axis == 0 ? 9 : axis == 1 ? 3 : 1;
-  std::vector<BlockRequest> foreign;
+  std::vector<std::vector<BlockRequest>> of_rank(static_cast<std::size_t>(comm_.size()));
   const std::size_t tiles = tiles_.size();
   for (std::size_t t = 0; t < tiles; ++t) {
-    for_each_reached(store_, tiles_[t], block_coord(blocks_.keys()[t]), periodicity_, [&](int n, BlockCoord b) {
-      if (owner(b) == comm_.rank()) {
-        blocks_.insert(block_key(b));
-      } else {
-        foreign.push_back({block_key(b), planes(n / stride % 3 - 1)});
+    const BlockCoord own = block_coord(blocks_.keys()[t]);
+    for_each_reached(store_, tiles_[t], own, periodicity_, [&](int n, BlockCoord b) {
+      const std::uint32_t mine = own_planes(b);
+      if (mine != 0) blocks_.insert(block_key(b));
+      const std::uint32_t foreign = reached_planes(own, n / stride % 3 - 1) & ~mine;
+      for (std::int32_t plane = 0; plane < kBlockWidth; ++plane) {
+        if ((foreign >> plane & 1U) == 0) continue;
+        of_rank[static_cast<std::size_t>(slabs_.owner(first_plane(b) + plane))].push_back({block_key(b), 1U << plane});
       }
     });
   }
-  std::sort(foreign.begin(), foreign.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
-  std::vector<std::vector<BlockRequest>> of_rank(static_cast<std::size_t>(comm_.size()));
-  for (const BlockRequest& request : foreign) {
-    auto& requests = of_rank[static_cast<std::size_t>(owner(block_coord(request.key)))];
-    if (requests.empty() || requests.back().key != request.key) {
-      requests.push_back(request);
-    } else {
-      requests.back().planes |= request.planes;
-    }
-  }
+  for (std::vector<BlockRequest>& requests : of_rank) merge(requests);
   return of_rank;
 }
 
 template <class P>
+std::uint32_t HostEngine<P>::reached_planes(BlockCoord own, int direction) const {
+  // Particles of this rank are nearest to its planes, and reach kTileMargin further.
+  const auto rank = static_cast<std::size_t>(comm_.rank());
+  const std::vector<std::int32_t>& cuts = slabs_.cuts();
+  std::uint32_t planes = direction < 0 ? 0b1100U : direction > 0 ? 0b0011U : 0b1111U;
+  for (std::int32_t n = 0; n < kBlockWidth; ++n) {
+    const std::int64_t plane = first_plane(own) + kBlockWidth * direction + n;
+    const bool below = rank > 0 && plane < std::int64_t{cuts[rank - 1]} - kTileMargin;
+    const bool above = rank < cuts.size() && plane >= std::int64_t{cuts[rank]} + kTileMargin;
+    if (below || above) planes &= ~(1U << n);
+  }
+  return planes;
+}
+
+template <class P>
 void HostEngine<P>::connect_tiles() {
-  // Owned blocks first, so that the grid update runs over a contiguous range; blocks of other ranks behind them.
+  // Blocks with nodes of this rank first, so that the grid update runs over a contiguous range; blocks of other ranks
+  // behind them. In a block that a cut divides the update runs over the nodes of others, too: their sums have left, and
+  // their velocities come.
   block_requests_.ask(reach_blocks(), comm_);
   // Blocks that only other ranks touch must exist here, too.
   for (const auto& requests : block_requests_.by_rank()) {
@@ -115,8 +138,13 @@ void HostEngine<P>::connect_halo() {
   block_sums_.assign(owned_blocks_, BlockSums::kInPlace);
   is_boundary_.assign(tiles_.size(), 0);
   if (comm_.size() == 1) return;
-  for (const auto& requests : block_requests_.by_rank()) {
-    for (const BlockRequest& request : requests) block_sums_[blocks_.find(request.key)] = BlockSums::kShared;
+  for (const auto* of_all : {&block_requests_.by_rank(), &block_requests_.of_rank()}) {
+    for (const std::vector<BlockRequest>& requests : *of_all) {
+      for (const BlockRequest& request : requests) {
+        const std::uint32_t block = blocks_.find(request.key);
+        if (block < owned_blocks_) block_sums_[block] = BlockSums::kShared;
+      }
+    }
   }
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     for (const std::uint32_t b : tiles_[t].neighbours) {
@@ -135,7 +163,7 @@ void HostEngine<P>::connect_halo() {
       }
     }
     ContributionMessages messages = ordered_.connect(
-        tiles_, blocks_, block_sums_, periodicity_.blocks[0], [&](BlockCoord b) { return owner(b); }, comm_);
+        tiles_, blocks_, block_sums_, periodicity_.blocks[0], [&](BlockCoord b) { return slabs_.owner(first_plane(b)); }, comm_);
     sum_exchange_.set(std::move(messages.sent), std::move(messages.received), comm_);
   } else {
     sum_exchange_.set(touched, owned, comm_);

@@ -54,9 +54,9 @@ SortedPlacements HostEngine<P>::separate(std::vector<Placement> placements) {
     std::vector<std::vector<Occupant>> to(static_cast<std::size_t>(comm_.size()));
     for (std::size_t n = 0; n < own; ++n) {
       const Occupant& o = occupants.of_block[n];
-      const std::int32_t plane = component(block_coord(o.block), slabs_.axis());
+      const std::int32_t own_plane = component(block_coord(o.block), slabs_.axis());
       for (const std::int32_t side : {-1, 1}) {
-        const int rank = slabs_.owner(periodicity_.wrap(plane + side, slabs_.axis()));
+        const int rank = slabs_.owner(kBlockWidth * periodicity_.wrap(own_plane + side, slabs_.axis()));
         auto& told = to[static_cast<std::size_t>(rank)];
         const bool known = !told.empty() && told.back().block == o.block;
         if (rank != comm_.rank() && !known) told.push_back(o);
@@ -76,7 +76,7 @@ SortedPlacements HostEngine<P>::separate(std::vector<Placement> placements) {
     for (int n = 0; n < 27; ++n) {
       const std::array<int, 3> d = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
       const BlockCoord there = periodicity_.wrap({own.x + d[0], own.y + d[1], own.z + d[2]});
-      if (!others_tell && owner(there) != comm_.rank()) return false;
+      if (!others_tell && own_planes(there) != kAllPlanes) return false;
       if (n == 13) continue;
       const std::uint32_t b = occupants.blocks.find(block_key(there));
       if (b == kNoBlock) continue;

@@ -1,4 +1,4 @@
-// Slabs of the host engine: where they are cut at the start, what their planes cost, and how they change.
+// Slabs of the host engine: where they are cut at the start, what their planes cost, how they change, whose a plane is.
 #include <array>
 #include <cmath>
 #include <type_traits>
@@ -17,6 +17,8 @@ constexpr WorkWeights kHostDouble{.tile = 2000e3, .pack = 490e3, .lone_pack = 16
 template <class P>
 constexpr WorkWeights kWeights = std::is_same_v<P, MixedPrecision> ? kHostMixed : kHostDouble;
 
+static_assert(mpi::kPlanesOfBlock == kBlockWidth);
+
 std::uint64_t whole(double picoseconds) { return static_cast<std::uint64_t>(std::llround(picoseconds)); }
 
 }  // namespace
@@ -24,8 +26,9 @@ std::uint64_t whole(double picoseconds) { return static_cast<std::uint64_t>(std:
 template <class P>
 void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
   std::array<mpi::PlaneWork, 3> mine;
+  const std::int32_t step = divides_blocks() ? 1 : kBlockWidth;
   for (const Placement& p : placements) {
-    for (std::size_t axis = 0; axis < 3; ++axis) ++mine[axis][p.node[axis] >> 2];
+    for (std::size_t axis = 0; axis < 3; ++axis) ++mine[axis].nodes[p.node[axis] & -step];
   }
   // Slabs across the longest extent of the matter share the fewest nodes.
   std::array<mpi::PlaneWork, 3> all;
@@ -42,15 +45,44 @@ template <class P>
 mpi::PlaneWork HostEngine<P>::work(std::span<const double> more) const {
   constexpr WorkWeights w = kWeights<P>;
   mpi::PlaneWork work;
-  const auto add = [&](BlockCoord block, double cost) { work[component(block, slabs_.axis())] += whole(cost); };
-  for (const Tile& tile : tiles_) {
-    add(block_coord(blocks_.keys()[tile.block]), w.tile + w.pack * packs_for(tile.particles));
-  }
-  for (const BlockCoord block : lone_block_) add(block, w.lone_pack / kLanes);
+  // A particle's lane of its pack goes with its plane; the tile and the lanes that stay empty are there on either side
+  // of a cut through the block.
   std::size_t n = 0;
-  if (more.empty()) return work;
-  for_each_particle([&](std::size_t, BlockCoord block) { add(block, more[n++]); });
+  const auto add = [&](std::size_t first_slot, std::uint32_t particles, BlockCoord block, double lane) {
+    std::array<std::uint64_t, kBlockWidth> of_plane{};
+    for (std::uint32_t i = 0; i < particles; ++i) {
+      of_plane[plane_in_block(first_slot + i)] += whole(lane) + (more.empty() ? 0 : whole(more[n++]));
+    }
+    for (std::size_t plane = 0; plane < of_plane.size(); ++plane) {
+      if (of_plane[plane] == 0) continue;
+      work.nodes[first_plane(block) + (divides_blocks() ? static_cast<std::int32_t>(plane) : 0)] += of_plane[plane];
+    }
+  };
+  for (const Tile& tile : tiles_) {
+    const BlockCoord block = block_coord(blocks_.keys()[tile.block]);
+    add(tile.first_pack * kLanes, tile.particles, block, w.pack / kLanes);
+    const auto empty = packs_for(tile.particles) * static_cast<std::uint32_t>(kLanes) - tile.particles;
+    work.blocks[component(block, slabs_.axis())] += whole(w.tile + empty * w.pack / kLanes);
+  }
+  for (std::uint32_t i = 0; i < lone_.particles; ++i) {
+    add(lone_.first_pack * kLanes + i, 1, lone_block_[i], w.lone_pack / kLanes);
+  }
   return work;
+}
+
+template <class P>
+std::size_t HostEngine<P>::plane_in_block(std::size_t slot) const {
+  const std::int32_t packed = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
+  return static_cast<std::size_t>(((packed >> (8 * slabs_.axis())) & 255) - kNodeBias);
+}
+
+template <class P>
+std::uint32_t HostEngine<P>::own_planes(BlockCoord block) const {
+  std::uint32_t own = 0;
+  for (std::int32_t n = 0; n < kBlockWidth; ++n) {
+    if (slabs_.owner(first_plane(block) + n) == comm_.rank()) own |= 1U << n;
+  }
+  return own;
 }
 
 template <class P>
