@@ -17,9 +17,9 @@ constexpr std::int32_t kNoPlane = std::numeric_limits<std::int32_t>::max() / kPl
 // either end, by more than the plane's own where a block begins.
 struct Row {
   std::vector<std::int32_t> plane;
-  std::vector<std::uint64_t> before{0};         // work of nodes before a plane
-  std::vector<std::uint64_t> blocks_before;     // work of blocks before that of a plane
-  std::vector<std::uint64_t> blocks_up_to;      // with it
+  std::vector<std::uint64_t> before{0};      // work of nodes before a plane
+  std::vector<std::uint64_t> blocks_before;  // work of blocks before that of a plane
+  std::vector<std::uint64_t> blocks_up_to;   // with it
 
   explicit Row(const PlaneWork& all) {
     std::uint64_t blocks = 0;
@@ -41,10 +41,9 @@ struct Row {
   // The furthest end of a slab from `first` with at most `limit`.
   [[nodiscard]] std::size_t furthest(std::size_t first, std::uint64_t limit) const {
     const auto ends = std::views::iota(first + 1, size() + 1);
-    return first + static_cast<std::size_t>(std::ranges::partition_point(ends, [&](std::size_t end) {
-                                              return work(first, end) <= limit;
-                                            }) -
-                                            ends.begin());
+    return first + static_cast<std::size_t>(
+                       std::ranges::partition_point(ends, [&](std::size_t end) { return work(first, end) <= limit; }) -
+                       ends.begin());
   }
   // The earliest begin of a slab up to `last` with at most `limit`.
   [[nodiscard]] std::size_t earliest(std::size_t last, std::uint64_t limit) const {

@@ -1,5 +1,5 @@
-// Slabs: the background grid cut between planes of nodes along one axis, each slab owned by one rank: its nodes, and the
-// particles nearest to them. A cut may run through blocks. A rank may own nothing.
+// Slabs: the background grid cut between planes of nodes along one axis, each slab owned by one rank: its nodes, and
+// the particles nearest to them. A cut may run through blocks. A rank may own nothing.
 #pragma once
 
 #include <cstdint>

@@ -114,8 +114,9 @@ class Engine {
   /// How the grid is cut. insert() cuts for equal numbers of particles, sort() leaves cuts as they are.
   [[nodiscard]] virtual const mpi::Slabs& slabs() const = 0;
   /// What the particles of this rank cost in a step on this engine, by the planes that slabs().axis() crosses: those
-  /// before which this engine can cut [ps]. Counted, not timed (grid/work_weights.hpp), so that a run repeats. `more`: what each of them costs elsewhere
-  /// [ps of a step], in the order of predict(); empty for nothing. Only between sort() and scatter().
+  /// before which this engine can cut [ps]. Counted, not timed (grid/work_weights.hpp), so that a run repeats. `more`:
+  /// what each of them costs elsewhere [ps of a step], in the order of predict(); empty for nothing. Only between
+  /// sort() and scatter().
   [[nodiscard]] virtual mpi::PlaneWork work(std::span<const double> more) const = 0;
   /// Cuts the grid anew; particles go to their owners with all that they hold, and are sorted. Only between sort() and
   /// scatter(). Collective.

@@ -109,8 +109,6 @@ class HostEngine final : public Engine {
   void arrange(const SortedPlacements& placements);
   void connect_tiles();
   [[nodiscard]] std::vector<std::vector<BlockRequest>> reach_blocks();
-  // Of the block in this direction, across the slabs, from the one at `own`: the planes that particles in that one reach.
-  [[nodiscard]] std::uint32_t reached_planes(BlockCoord own, int direction) const;
   void make_room();  // for the nodes of all blocks
   void connect_halo();
   [[nodiscard]] std::vector<mpi::SharedNodes> nodes_of(const std::vector<std::vector<BlockRequest>>& requests) const;

@@ -6,6 +6,9 @@
 namespace breccia::grid {
 namespace {
 
+// From one neighbour of a tile to the next along an axis, as Tile::neighbours counts them.
+constexpr int kStride[3] = {9, 3, 1};
+
 // Per axis, whether a tile reaches the block below (bit 0) and above (bit 1), from the cells its particles are in:
 // stencil and margin reach kTileMargin nodes further.
 template <class P>
@@ -25,7 +28,11 @@ std::array<int, 3> reach(const ParticleStore<P>& store, const Tile& tile) {
 
 bool reaches(int sides, int direction) { return direction == 0 || (sides & (direction < 0 ? 1 : 2)) != 0; }
 
-// Calls visit(n, block) for the blocks tile reaches; n as in Tile::neighbours.
+BlockCoord neighbour(BlockCoord own, int n, const Periodicity& periodicity) {
+  return periodicity.wrap({own.x + n / 9 - 1, own.y + n / 3 % 3 - 1, own.z + n % 3 - 1});
+}
+
+// Calls visit(n, block) for the blocks of the box that the tile reaches; n as in Tile::neighbours.
 template <class P, class F>
 void for_each_reached(const ParticleStore<P>& store, const Tile& tile, BlockCoord own, const Periodicity& periodicity,
                       F&& visit) {
@@ -33,8 +40,34 @@ void for_each_reached(const ParticleStore<P>& store, const Tile& tile, BlockCoor
   for (int n = 0; n < 27; ++n) {
     const int d[3] = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
     if (!reaches(sides[0], d[0]) || !reaches(sides[1], d[1]) || !reaches(sides[2], d[2])) continue;
-    visit(n, periodicity.wrap({own.x + d[0], own.y + d[1], own.z + d[2]}));
+    visit(n, neighbour(own, n, periodicity));
   }
+}
+
+// Of each block, n as in Tile::neighbours, the planes across `axis` with nodes that particles of the tile reach: what
+// another rank has to know of. Fewer than the box around the tile where matter thins out towards a cut.
+template <class P>
+std::array<std::uint32_t, 27> reached_planes(const ParticleStore<P>& store, const Tile& tile, int axis) {
+  const int across = kStride[axis];
+  const int first = kStride[(axis + 1) % 3];
+  const int second = kStride[(axis + 2) % 3];
+  std::array<std::uint32_t, 27> planes{};
+  for (std::uint32_t i = 0; i < tile.particles; ++i) {
+    const std::int32_t packed = store.kinematics[tile.first_pack + i / P::kLanes].node[static_cast<int>(i % P::kLanes)];
+    const auto node = [&](int of_axis) { return ((packed >> (8 * of_axis)) & 255) - kNodeBias; };
+    // -1, 0 or 1: the block that holds a node so far from the particle's.
+    const auto block = [&](int of_axis, int away) { return ((node(of_axis) + away) >> 2); };
+    for (int away = -kTileMargin; away <= kTileMargin; ++away) {
+      const std::uint32_t plane = 1U << ((node(axis) + away) & (kBlockWidth - 1));
+      const int n = 13 + across * block(axis, away);
+      for (const int a : {block((axis + 1) % 3, -kTileMargin), block((axis + 1) % 3, kTileMargin)}) {
+        for (const int b : {block((axis + 2) % 3, -kTileMargin), block((axis + 2) % 3, kTileMargin)}) {
+          planes[static_cast<std::size_t>(n + first * a + second * b)] |= plane;
+        }
+      }
+    }
+  }
+  return planes;
 }
 
 // One request for each block, in the order of their keys.
@@ -56,38 +89,33 @@ void merge(std::vector<BlockRequest>& requests) {
 template <class P>
 std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
   const int axis = slabs_.axis();
-  const int stride = axis == 0 ? 9 : axis == 1 ? 3 : 1;
   std::vector<std::vector<BlockRequest>> of_rank(static_cast<std::size_t>(comm_.size()));
   const std::size_t tiles = tiles_.size();
   for (std::size_t t = 0; t < tiles; ++t) {
     const BlockCoord own = block_coord(blocks_.keys()[t]);
+    bool all_mine = true;
+    std::array<std::uint32_t, 27> planes{};
     for_each_reached(store_, tiles_[t], own, periodicity_, [&](int n, BlockCoord b) {
       const std::uint32_t mine = own_planes(b);
       if (mine != 0) blocks_.insert(block_key(b));
-      const std::uint32_t foreign = reached_planes(own, n / stride % 3 - 1) & ~mine;
+      all_mine = all_mine && mine == kAllPlanes;
+      const int direction = n / kStride[axis] % 3 - 1;
+      planes[static_cast<std::size_t>(n)] = direction < 0 ? 0b1100U : direction > 0 ? 0b0011U : kAllPlanes;
+    });
+    if (all_mine) continue;
+    // Ordered sums are told for each tile, and all of its box.
+    if (!setup_.numerics.reproducible) planes = reached_planes(store_, tiles_[t], axis);
+    for (int n = 0; n < 27; ++n) {
+      const BlockCoord b = neighbour(own, n, periodicity_);
+      const std::uint32_t foreign = planes[static_cast<std::size_t>(n)] & ~own_planes(b);
       for (std::int32_t plane = 0; plane < kBlockWidth; ++plane) {
         if ((foreign >> plane & 1U) == 0) continue;
         of_rank[static_cast<std::size_t>(slabs_.owner(first_plane(b) + plane))].push_back({block_key(b), 1U << plane});
       }
-    });
+    }
   }
   for (std::vector<BlockRequest>& requests : of_rank) merge(requests);
   return of_rank;
-}
-
-template <class P>
-std::uint32_t HostEngine<P>::reached_planes(BlockCoord own, int direction) const {
-  // Particles of this rank are nearest to its planes, and reach kTileMargin further.
-  const auto rank = static_cast<std::size_t>(comm_.rank());
-  const std::vector<std::int32_t>& cuts = slabs_.cuts();
-  std::uint32_t planes = direction < 0 ? 0b1100U : direction > 0 ? 0b0011U : 0b1111U;
-  for (std::int32_t n = 0; n < kBlockWidth; ++n) {
-    const std::int64_t plane = first_plane(own) + kBlockWidth * direction + n;
-    const bool below = rank > 0 && plane < std::int64_t{cuts[rank - 1]} - kTileMargin;
-    const bool above = rank < cuts.size() && plane >= std::int64_t{cuts[rank]} + kTileMargin;
-    if (below || above) planes &= ~(1U << n);
-  }
-  return planes;
 }
 
 template <class P>
@@ -107,7 +135,7 @@ void HostEngine<P>::connect_tiles() {
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::fill(std::begin(tiles_[t].neighbours), std::end(tiles_[t].neighbours), kNoBlock);
     for_each_reached(store_, tiles_[t], block_coord(blocks_.keys()[t]), periodicity_,
-                     [&](int n, BlockCoord b) { tiles_[t].neighbours[n] = blocks_.find(block_key(b)); });
+                     [&](int n, BlockCoord b) { tiles_[t].neighbours[n] = blocks_.insert(block_key(b)); });
   }
   connect_halo();
   make_room();
@@ -163,7 +191,8 @@ void HostEngine<P>::connect_halo() {
       }
     }
     ContributionMessages messages = ordered_.connect(
-        tiles_, blocks_, block_sums_, periodicity_.blocks[0], [&](BlockCoord b) { return slabs_.owner(first_plane(b)); }, comm_);
+        tiles_, blocks_, block_sums_, periodicity_.blocks[0],
+        [&](BlockCoord b) { return slabs_.owner(first_plane(b)); }, comm_);
     sum_exchange_.set(std::move(messages.sent), std::move(messages.received), comm_);
   } else {
     sum_exchange_.set(touched, owned, comm_);

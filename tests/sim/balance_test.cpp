@@ -89,7 +89,9 @@ TEST(Balance, WorkStaysEvenWhereMatterMoves) {
 // tiles of a plane of blocks that a cut divides. Particles without grid are left out: one at a cut has neighbours that
 // its rank does not know.
 void expect_counts_of_one_rank(bool reproducible) {
-  const Scene scene = load(collision(9e3), {"numerics.lone_without_grid=false", "parallel.axis=x", reproducible ? "numerics.reproducible=true" : "numerics.reproducible=false"});
+  const Scene scene =
+      load(collision(9e3), {"numerics.lone_without_grid=false", "parallel.axis=x",
+                            reproducible ? "numerics.reproducible=true" : "numerics.reproducible=false"});
   const ResolvedEffects effects = resolve_effects(scene);
   const TimeLoop many(scene, effects, 1, mpi::Comm());
   const TimeLoop one(scene, effects, 1, mpi::Comm(MPI_COMM_SELF));

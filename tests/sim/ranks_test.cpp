@@ -24,7 +24,8 @@ TEST(Ranks, CollisionWithEveryEffect) {
   EXPECT_TRUE(ranks() <= 2 || work.migrated > 50) << work.migrated;
 }
 
-// Two spheres of four cells are some ten planes of nodes: slabs are as thin as a particle's reach, two planes, or thinner.
+// Two spheres of four cells are some ten planes of nodes: slabs are as thin as a particle's reach, two planes, or
+// thinner.
 TEST(Ranks, SlabsThinnerThanTheReach) {
   const Work work = expect_same_as_one_rank(load(collision(25e3)), {200e3, 200.0});
   EXPECT_EQ(work.busy_ranks, ranks());
