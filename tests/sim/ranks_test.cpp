@@ -78,5 +78,26 @@ TEST_P(PeriodicRanks, SlideThroughTheEnds) {
 }
 INSTANTIATE_TEST_SUITE_P(Blocks, PeriodicRanks, testing::Values(1, 2, 3, 4));
 
+// Messages that travel behind the interior tiles carry the same values as those that are waited for at once: what is
+// added to shared nodes, and in which order, does not depend on when it arrives. Bodies on a wall, so that nodes of the
+// wall are shared, too.
+TEST(Overlap, SameBitsAsWithout) {
+  const std::string wall = R"([[boundary]]
+point = ["0 km", "0 km", "-50 km"]
+normal = [0, 0, 1]
+kind = "friction"
+friction = 0.3
+)";
+  const auto states = [&](const char* overlap) {
+    return history(load(collision(12e3) + wall, {"effects.gravity=off", "numerics.precision=mixed",
+                                                 std::string("numerics.overlap=") + overlap}),
+                   mpi::Comm());
+  };
+  const std::vector<State> behind = states("true");
+  const std::vector<State> waited = states("false");
+  for (std::size_t n = 0; n < behind.size(); ++n) expect_equal(behind[n], waited[n], {1.0, 1.0}, 0.0);
+  EXPECT_TRUE(ranks() <= 2 || work_of(behind).migrated > 5);
+}
+
 }  // namespace
 }  // namespace breccia::sim::test
