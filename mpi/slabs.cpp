@@ -3,35 +3,54 @@
 #include <algorithm>
 #include <cstddef>
 #include <limits>
+#include <optional>
+#include <ranges>
 #include <span>
 
 namespace breccia::mpi {
 namespace {
 
-// Planes in their order with the work before each: a slab is a range of indices, its work a difference.
+// Past every plane, and where a block begins.
+constexpr std::int32_t kNoPlane = std::numeric_limits<std::int32_t>::max() / kPlanesOfBlock * kPlanesOfBlock;
+
+// Planes of nodes in their order with the work before each: a slab is a range of indices. Its work grows with it at
+// either end, by more than the plane's own where a block begins.
 struct Row {
   std::vector<std::int32_t> plane;
-  std::vector<std::uint64_t> before{0};
+  std::vector<std::uint64_t> before{0};      // work of nodes before a plane
+  std::vector<std::uint64_t> blocks_before;  // work of blocks before that of a plane
+  std::vector<std::uint64_t> blocks_up_to;   // with it
 
   explicit Row(const PlaneWork& all) {
-    for (const auto& [p, work] : all) {
+    std::uint64_t blocks = 0;
+    for (const auto& [p, work] : all.nodes) {
+      const bool new_block = plane.empty() || block_of_plane(plane.back()) != block_of_plane(p);
+      if (new_block) blocks = blocks_up_to.empty() ? 0 : blocks_up_to.back();
+      const auto found = all.blocks.find(block_of_plane(p));
       plane.push_back(p);
       before.push_back(before.back() + work);
+      blocks_before.push_back(blocks);
+      blocks_up_to.push_back(blocks + (found == all.blocks.end() ? 0 : found->second));
     }
   }
   [[nodiscard]] std::size_t size() const { return plane.size(); }
-  [[nodiscard]] std::uint64_t work(std::size_t first, std::size_t last) const { return before[last] - before[first]; }
+  [[nodiscard]] std::uint64_t work(std::size_t first, std::size_t last) const {
+    return first == last ? 0 : before[last] - before[first] + blocks_up_to[last - 1] - blocks_before[first];
+  }
 
   // The furthest end of a slab from `first` with at most `limit`.
   [[nodiscard]] std::size_t furthest(std::size_t first, std::uint64_t limit) const {
-    const auto end =
-        std::upper_bound(before.begin() + static_cast<std::ptrdiff_t>(first), before.end(), before[first] + limit);
-    return static_cast<std::size_t>(end - before.begin()) - 1;
+    const auto ends = std::views::iota(first + 1, size() + 1);
+    return first + static_cast<std::size_t>(
+                       std::ranges::partition_point(ends, [&](std::size_t end) { return work(first, end) <= limit; }) -
+                       ends.begin());
   }
   // The earliest begin of a slab up to `last` with at most `limit`.
   [[nodiscard]] std::size_t earliest(std::size_t last, std::uint64_t limit) const {
-    const std::uint64_t least = before[last] > limit ? before[last] - limit : 0;
-    return static_cast<std::size_t>(std::lower_bound(before.begin(), before.end(), least) - before.begin());
+    const auto begins = std::views::iota(std::size_t{0}, last);
+    return static_cast<std::size_t>(
+        std::ranges::partition_point(begins, [&](std::size_t begin) { return work(begin, last) > limit; }) -
+        begins.begin());
   }
   [[nodiscard]] bool fits(std::uint64_t limit, int ranks) const {
     std::size_t at = 0;
@@ -43,8 +62,8 @@ struct Row {
 // The least that the busiest rank can have.
 std::uint64_t least_maximum(const Row& row, int ranks) {
   const auto r = static_cast<std::uint64_t>(ranks);
-  std::uint64_t low = (row.before.back() + r - 1) / r;
-  std::uint64_t high = row.before.back();
+  std::uint64_t high = row.work(0, row.size());
+  std::uint64_t low = (high + r - 1) / r;
   while (low < high) {
     const std::uint64_t middle = low + (high - low) / 2;
     if (row.fits(middle, ranks)) {
@@ -63,28 +82,35 @@ PlaneWork sum_over_ranks(const PlaneWork& mine, const Comm& comm) {
     std::int32_t plane;
     std::uint64_t work;
   };
-  std::vector<Entry> entries;
-  entries.reserve(mine.size());
-  for (const auto& [plane, work] : mine) entries.push_back({plane, work});
+  const auto of_all_ranks = [&](const std::map<std::int32_t, std::uint64_t>& own) {
+    std::vector<Entry> entries;
+    entries.reserve(own.size());
+    for (const auto& [plane, work] : own) entries.push_back({plane, work});
+    return comm.allgather_arrays(std::span<const Entry>(entries));
+  };
   PlaneWork all;
-  for (const Entry& e : comm.allgather_arrays(std::span<const Entry>(entries))) all[e.plane] += e.work;
+  for (const Entry& e : of_all_ranks(mine.nodes)) all.nodes[e.plane] += e.work;
+  for (const Entry& e : of_all_ranks(mine.blocks)) all.blocks[e.plane] = std::max(all.blocks[e.plane], e.work);
   return all;
 }
 
 std::uint64_t total(const PlaneWork& work) {
   std::uint64_t sum = 0;
-  for (const auto& [plane, w] : work) sum += w;
+  for (const auto& [plane, w] : work.nodes) sum += w;
+  for (const auto& [plane, w] : work.blocks) sum += w;
   return sum;
 }
 
 std::int64_t extent(const PlaneWork& work) {
-  const std::uint64_t tail = total(work) / 20;
+  std::uint64_t all = 0;
+  for (const auto& [plane, w] : work.nodes) all += w;
+  const std::uint64_t tail = all / 20;
   std::int32_t low = 0;
   std::uint64_t before = 0;
-  for (const auto& [plane, w] : work) {
+  for (const auto& [plane, w] : work.nodes) {
     if (before <= tail && w > 0) low = plane;
     before += w;
-    if (before >= total(work) - tail) return std::int64_t{plane} - low + 1;
+    if (before >= all - tail) return std::int64_t{plane} - low + 1;
   }
   return 0;
 }
@@ -113,7 +139,7 @@ Slabs Slabs::balanced(int axis, const PlaneWork& all, int ranks) {
       if (error(i) < error(best)) best = i;
     }
     begin = best;
-    slabs.cuts_.push_back(begin < row.size() ? row.plane[begin] : std::numeric_limits<std::int32_t>::max());
+    slabs.cuts_.push_back(begin < row.size() ? row.plane[begin] : kNoPlane);
   }
   return slabs;
 }
@@ -122,9 +148,21 @@ int Slabs::owner(std::int32_t plane) const {
   return static_cast<int>(std::upper_bound(cuts_.begin(), cuts_.end(), plane) - cuts_.begin());
 }
 
+bool Slabs::keep_whole(std::int32_t planes) const {
+  return std::ranges::all_of(cuts_, [planes](std::int32_t plane) { return plane % planes == 0; });
+}
+
 std::vector<std::uint64_t> Slabs::shares(const PlaneWork& all) const {
   std::vector<std::uint64_t> shares(cuts_.size() + 1, 0);
-  for (const auto& [plane, work] : all) shares[static_cast<std::size_t>(owner(plane))] += work;
+  std::optional<std::pair<int, std::int32_t>> last;  // rank and block of the plane before
+  for (const auto& [plane, work] : all.nodes) {
+    const std::pair part{owner(plane), block_of_plane(plane)};
+    std::uint64_t& share = shares[static_cast<std::size_t>(part.first)];
+    share += work;
+    const auto block = all.blocks.find(part.second);
+    if (last != part && block != all.blocks.end()) share += block->second;
+    last = part;
+  }
   return shares;
 }
 

@@ -26,6 +26,7 @@ CudaEngine<P>::CudaEngine(const grid::EngineSetup& setup, const mpi::Comm& comm)
       // Walls act on nodes: a particle needs them near one.
       grid_(boundaries_.periodicity(), setup.numerics.lone_without_grid && !boundaries_.has_walls()),
       transfer_(transfer_of<Real>(setup.numerics)) {
+  setup_.divide_blocks = false;  // halo.cpp: ranks share whole blocks
   std::vector<material::Constants<Real>> constants;
   std::vector<material::Constants<double>> double_constants;
   for (const MaterialParameters& material : setup.materials) {

@@ -25,8 +25,8 @@ template <class P>
 OwnPlanes CudaEngine<P>::own_planes() const {
   OwnPlanes planes{.axis = slabs_.axis()};
   const auto rank = static_cast<std::size_t>(comm_.rank());
-  if (rank > 0) planes.low = slabs_.cuts()[rank - 1];
-  if (rank < slabs_.cuts().size()) planes.high = slabs_.cuts()[rank];
+  if (rank > 0) planes.low = mpi::block_of_plane(slabs_.cuts()[rank - 1]);
+  if (rank < slabs_.cuts().size()) planes.high = mpi::block_of_plane(slabs_.cuts()[rank]);
   return planes;
 }
 
@@ -41,7 +41,7 @@ void CudaEngine<P>::migrate() {
   std::vector<unsigned> staying;
   std::vector<grid::BlockKey> staying_keys;
   for (unsigned slot = 0; slot < keys.size(); ++slot) {
-    const int rank = slabs_.owner(grid::component(grid::block_coord(keys[slot]), slabs_.axis()));
+    const int rank = slabs_.owner(grid::kBlockWidth * grid::component(grid::block_coord(keys[slot]), slabs_.axis()));
     if (rank == comm_.rank()) {
       staying.push_back(slot);
       staying_keys.push_back(keys[slot]);
@@ -133,7 +133,7 @@ mpi::PlaneWork CudaEngine<P>::work(std::span<const double> more) const {
     std::uint64_t cost = run % kWarp == 0 ? kWarpWork : 0;
     if (run == 0) cost += kTileWork;
     if (!more.empty()) cost += static_cast<std::uint64_t>(std::llround(more[i]));
-    work[grid::component(grid::block_coord(keys[i]), slabs_.axis())] += cost;
+    work.nodes[grid::kBlockWidth * grid::component(grid::block_coord(keys[i]), slabs_.axis())] += cost;
   }
   return work;
 }

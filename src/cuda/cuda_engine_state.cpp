@@ -95,14 +95,16 @@ material::FlawLists CudaEngine<P>::flaws() const {
 
 template <class P>
 void CudaEngine<P>::restore(const EngineState& state, const material::FlawLists& flaws) {
-  if (!state.same_ranks || setup_.slab_axis.value_or(state.slab_axis) != state.slab_axis) {
+  const mpi::Slabs saved(state.slab_axis, state.slab_cuts);
+  const bool wanted = setup_.slab_axis.value_or(state.slab_axis) == state.slab_axis;
+  if (!state.same_ranks || !wanted || !saved.keep_whole(mpi::kPlanesOfBlock)) {
     // The host engine knows how to cut slabs and share out particles.
     const auto host = grid::make_host_engine(setup_, comm_);
     host->restore(state, flaws);
     restore(host->save(), host->flaws());
     return;
   }
-  slabs_ = mpi::Slabs(state.slab_axis, state.slab_cuts);
+  slabs_ = saved;
   if (state.damage_finished && setup_.effects.damage) switch_damage_off();
   particles_.allocate(state.particles);
   std::vector<grid::BlockKey> keys(state.particles);

@@ -23,7 +23,7 @@ std::vector<std::vector<grid::BlockKey>> offers(std::span<const grid::BlockKey> 
   for (const grid::BlockKey key : blocks) {
     const std::int32_t plane = grid::component(grid::block_coord(key), slabs.axis());
     for (int side = -1; side <= 1; ++side) {
-      const int rank = slabs.owner(periodicity.wrap(plane + side, slabs.axis()));
+      const int rank = slabs.owner(grid::kBlockWidth * periodicity.wrap(plane + side, slabs.axis()));
       auto& keys = of_rank[static_cast<std::size_t>(rank)];
       if (rank != comm.rank() && (keys.empty() || keys.back() != key)) keys.push_back(key);
     }

@@ -30,6 +30,7 @@ struct EngineSetup {
   NumericsParameters numerics;
   int threads = 1;
   std::optional<int> slab_axis;  ///< the grid is cut along it; none: along the longest extent of the matter
+  bool divide_blocks = true;     ///< cuts may run through blocks, where the engine can do with that
 };
 
 /// What tells how a particle is.
@@ -112,9 +113,10 @@ class Engine {
 
   /// How the grid is cut. insert() cuts for equal numbers of particles, sort() leaves cuts as they are.
   [[nodiscard]] virtual const mpi::Slabs& slabs() const = 0;
-  /// What the particles of this rank cost in a step on this engine, by the block planes that slabs().axis() crosses
-  /// [ps]. Counted, not timed (grid/work_weights.hpp), so that a run repeats. `more`: what each of them costs elsewhere
-  /// [ps of a step], in the order of predict(); empty for nothing. Only between sort() and scatter().
+  /// What the particles of this rank cost in a step on this engine, by the planes that slabs().axis() crosses: those
+  /// before which this engine can cut [ps]. Counted, not timed (grid/work_weights.hpp), so that a run repeats. `more`:
+  /// what each of them costs elsewhere [ps of a step], in the order of predict(); empty for nothing. Only between
+  /// sort() and scatter().
   [[nodiscard]] virtual mpi::PlaneWork work(std::span<const double> more) const = 0;
   /// Cuts the grid anew; particles go to their owners with all that they hold, and are sorted. Only between sort() and
   /// scatter(). Collective.

@@ -20,7 +20,7 @@ struct OccupiedCells {
   std::uint16_t axis[3] = {0, 0, 0};
 };
 
-/// Nodes of a block that a rank asks the owner for: bit n for the plane n across the slabs.
+/// Nodes of a block that a rank asks their owner for: bit n for the plane n across the slabs.
 struct BlockRequest {
   BlockKey key;
   std::uint32_t planes;
@@ -122,7 +122,17 @@ class HostEngine final : public Engine {
   // The flaws of list `row` become those of `slot`; the first `active` of them grow already.
   void set_flaws(std::size_t slot, const material::FlawLists& flaws, std::size_t row, std::uint32_t active);
 
-  [[nodiscard]] int owner(BlockCoord block) const { return slabs_.owner(component(block, slabs_.axis())); }
+  // Slabs. Planes are those of nodes across the slabs; sets of the four of a block have bit n for its plane n.
+  [[nodiscard]] int owner(const Placement& p) const { return slabs_.owner(p.node[slabs_.axis()]); }
+  [[nodiscard]] std::int32_t first_plane(BlockCoord block) const {
+    return kBlockWidth * component(block, slabs_.axis());
+  }
+  [[nodiscard]] std::uint32_t own_planes(BlockCoord block) const;
+  static constexpr std::uint32_t kAllPlanes = 0b1111;
+  [[nodiscard]] std::size_t plane_in_stack(std::size_t slot) const;  // of a particle's node, just after a sorting
+  [[nodiscard]] std::int32_t planes_kept_together(int axis) const;   // no cut runs between them
+  // Ordered sums are those of whole tiles.
+  [[nodiscard]] bool divides_blocks() const { return setup_.divide_blocks && !setup_.numerics.reproducible; }
 
   // Calls visit(slot, stack) for every particle, in storage order; its node is relative to that block.
   template <class F>

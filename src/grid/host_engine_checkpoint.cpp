@@ -91,8 +91,10 @@ void HostEngine<P>::restore(const EngineState& state, const material::FlawLists&
     if (store_.has(Group::kFlaws)) restore_flaws(state, flaws);
   });
   smallest_mass_ = state.smallest_mass;
-  if (state.same_ranks && setup_.slab_axis.value_or(state.slab_axis) == state.slab_axis) {
-    slabs_ = mpi::Slabs(state.slab_axis, state.slab_cuts);
+  const mpi::Slabs saved(state.slab_axis, state.slab_cuts);
+  const bool wanted = setup_.slab_axis.value_or(state.slab_axis) == state.slab_axis;
+  if (state.same_ranks && wanted && saved.keep_whole(planes_kept_together(state.slab_axis))) {
+    slabs_ = saved;
   } else {
     choose_slabs(placements);
   }

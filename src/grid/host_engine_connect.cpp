@@ -19,17 +19,64 @@ unsigned reached_blocks(unsigned cells, int blocks_of_stack) {
   return reached;
 }
 
-// Calls visit(n, block) for the blocks a tile reaches; n as in Tile::neighbours, `block` not wrapped.
+BlockCoord neighbour(BlockKey stack, int n) {
+  const BlockCoord own = block_coord(stack);
+  const BlockCoord d = neighbour_offset(n);
+  return {own.x + d.x, own.y + d.y, own.z + d.z};
+}
+
+// Calls visit(n, block) for the blocks of the box that a tile reaches; n as in Tile::neighbours, `block` not wrapped.
 template <class F>
-void for_each_reached(const OccupiedCells& cells, BlockKey stack_key, F&& visit) {
+void for_each_reached(const OccupiedCells& cells, BlockKey stack, F&& visit) {
   const unsigned reached[3] = {reached_blocks(cells.axis[0], 1), reached_blocks(cells.axis[1], 1),
                                reached_blocks(cells.axis[2], kStackBlocks)};
-  const BlockCoord stack = block_coord(stack_key);
   for (int n = 0; n < kNeighbours; ++n) {
     const BlockCoord d = neighbour_offset(n);
     const bool hit = (reached[0] >> (d.x + 1) & reached[1] >> (d.y + 1) & reached[2] >> (d.z + 1) & 1U) != 0;
-    if (hit) visit(n, BlockCoord{stack.x + d.x, stack.y + d.y, stack.z + d.z});
+    if (hit) visit(n, neighbour(stack, n));
   }
+}
+
+// Of each block, n as in Tile::neighbours, the planes across `axis` with nodes that particles of the tile reach: what
+// another rank has to know of. Fewer than the box around the tile where matter thins out towards a cut.
+template <class P>
+std::array<std::uint32_t, kNeighbours> reached_planes(const ParticleStore<P>& store, const Tile& tile, int axis) {
+  const int u = (axis + 1) % 3;
+  const int v = (axis + 2) % 3;
+  std::array<std::uint32_t, kNeighbours> planes{};
+  for (std::uint32_t i = 0; i < tile.particles; ++i) {
+    const std::int32_t packed = store.kinematics[tile.first_pack + i / P::kLanes].node[static_cast<int>(i % P::kLanes)];
+    const auto node = [&](int of_axis) { return ((packed >> (8 * of_axis)) & 255) - kNodeBias; };
+    // The block that holds a node so far from the particle's, from the lowest of the stack.
+    const auto block = [&](int of_axis, int away) { return (node(of_axis) + away) >> 2; };
+    for (int away = -kTileMargin; away <= kTileMargin; ++away) {
+      const std::uint32_t plane = 1U << ((node(axis) + away) & (kBlockWidth - 1));
+      for (const int a : {block(u, -kTileMargin), block(u, kTileMargin)}) {
+        for (const int b : {block(v, -kTileMargin), block(v, kTileMargin)}) {
+          int at[3];
+          at[axis] = block(axis, away);
+          at[u] = a;
+          at[v] = b;
+          planes[static_cast<std::size_t>(neighbour_at({at[0], at[1], at[2]}))] |= plane;
+        }
+      }
+    }
+  }
+  return planes;
+}
+
+// One request for each block, in the order of their keys.
+void merge(std::vector<BlockRequest>& requests) {
+  std::sort(requests.begin(), requests.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
+  std::vector<BlockRequest> merged;
+  for (const BlockRequest& request : requests) {
+    if (merged.empty() || merged.back().key != request.key) {
+      merged.push_back(request);
+    } else {
+      merged.back().planes |= request.planes;
+    }
+  }
+  requests = std::move(merged);
 }
 
 }  // namespace
@@ -37,27 +84,30 @@ void for_each_reached(const OccupiedCells& cells, BlockKey stack_key, F&& visit)
 template <class P>
 std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
   const int axis = slabs_.axis();
-  std::vector<BlockRequest> foreign;
+  std::vector<std::vector<BlockRequest>> of_rank(static_cast<std::size_t>(comm_.size()));
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    bool all_mine = true;
+    std::array<std::uint32_t, kNeighbours> planes{};
     for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord there) {
       const BlockCoord b = periodicity_.wrap(there);
-      if (owner(b) == comm_.rank()) {
-        blocks_.insert(block_key(b));
-      } else {
-        foreign.push_back({block_key(b), planes_in_reach(neighbour_offset(n), axis)});
-      }
+      const std::uint32_t mine = own_planes(b);
+      if (mine != 0) blocks_.insert(block_key(b));
+      all_mine = all_mine && mine == kAllPlanes;
+      planes[static_cast<std::size_t>(n)] = planes_in_reach(neighbour_offset(n), axis);
     });
-  }
-  std::sort(foreign.begin(), foreign.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
-  std::vector<std::vector<BlockRequest>> of_rank(static_cast<std::size_t>(comm_.size()));
-  for (const BlockRequest& request : foreign) {
-    auto& requests = of_rank[static_cast<std::size_t>(owner(block_coord(request.key)))];
-    if (requests.empty() || requests.back().key != request.key) {
-      requests.push_back(request);
-    } else {
-      requests.back().planes |= request.planes;
+    if (all_mine) continue;
+    // Ordered sums are told for each tile, and all of its box.
+    if (!setup_.numerics.reproducible) planes = reached_planes(store_, tiles_[t], axis);
+    for (int n = 0; n < kNeighbours; ++n) {
+      const BlockCoord b = periodicity_.wrap(neighbour(stacks_[t], n));
+      const std::uint32_t foreign = planes[static_cast<std::size_t>(n)] & ~own_planes(b);
+      for (std::int32_t plane = 0; plane < kBlockWidth; ++plane) {
+        if ((foreign >> plane & 1U) == 0) continue;
+        of_rank[static_cast<std::size_t>(slabs_.owner(first_plane(b) + plane))].push_back({block_key(b), 1U << plane});
+      }
     }
   }
+  for (std::vector<BlockRequest>& requests : of_rank) merge(requests);
   return of_rank;
 }
 
@@ -68,7 +118,7 @@ void HostEngine<P>::insert_stacks() {
     tiles_[t].first_block = static_cast<std::uint32_t>(blocks_.size());
     for_each_reached(occupied_cells_[t], stacks_[t], [&](int, BlockCoord b) {
       const bool of_stack = stack_of(b) == block_coord(stacks_[t]);
-      if (of_stack && periodicity_.wrap(b) == b && owner(b) == comm_.rank()) blocks_.insert(block_key(b));
+      if (of_stack && periodicity_.wrap(b) == b && own_planes(b) != 0) blocks_.insert(block_key(b));
     });
     tiles_[t].last_block = static_cast<std::uint32_t>(blocks_.size());
   }
@@ -76,8 +126,9 @@ void HostEngine<P>::insert_stacks() {
 
 template <class P>
 void HostEngine<P>::connect_tiles() {
-  // Owned blocks first, so that the grid update runs over a contiguous range, and of these the stacks of the tiles;
-  // blocks of other ranks behind them.
+  // Blocks with nodes of this rank first, so that the grid update runs over a contiguous range, and of these the stacks
+  // of the tiles; blocks of other ranks behind them. In a block that a cut divides the update runs over the nodes of
+  // others, too: their sums have left, and their velocities come.
   insert_stacks();
   block_requests_.ask(reach_blocks(), comm_);
   // Blocks that only other ranks touch must exist here, too.
@@ -91,7 +142,7 @@ void HostEngine<P>::connect_tiles() {
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::fill(std::begin(tiles_[t].neighbours), std::end(tiles_[t].neighbours), kNoBlock);
     for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord b) {
-      tiles_[t].neighbours[n] = blocks_.find(block_key(periodicity_.wrap(b)));
+      tiles_[t].neighbours[n] = blocks_.insert(block_key(periodicity_.wrap(b)));
     });
   }
   connect_halo();
@@ -122,8 +173,13 @@ void HostEngine<P>::connect_halo() {
   block_sums_.assign(owned_blocks_, BlockSums::kInPlace);
   is_boundary_.assign(tiles_.size(), 0);
   if (comm_.size() == 1) return;
-  for (const auto& requests : block_requests_.by_rank()) {
-    for (const BlockRequest& request : requests) block_sums_[blocks_.find(request.key)] = BlockSums::kShared;
+  for (const auto* of_all : {&block_requests_.by_rank(), &block_requests_.of_rank()}) {
+    for (const std::vector<BlockRequest>& requests : *of_all) {
+      for (const BlockRequest& request : requests) {
+        const std::uint32_t block = blocks_.find(request.key);
+        if (block < owned_blocks_) block_sums_[block] = BlockSums::kShared;
+      }
+    }
   }
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     for (const std::uint32_t b : tiles_[t].neighbours) {
@@ -142,7 +198,8 @@ void HostEngine<P>::connect_halo() {
       }
     }
     ContributionMessages messages = ordered_.connect(
-        tiles_, stacks_, blocks_, block_sums_, periodicity_.blocks[0], [&](BlockCoord b) { return owner(b); }, comm_);
+        tiles_, stacks_, blocks_, block_sums_, periodicity_.blocks[0],
+        [&](BlockCoord b) { return slabs_.owner(first_plane(b)); }, comm_);
     sum_exchange_.set(std::move(messages.sent), std::move(messages.received), comm_);
   } else {
     sum_exchange_.set(touched, owned, comm_);

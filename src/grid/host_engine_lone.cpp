@@ -16,7 +16,7 @@ std::vector<char> HostEngine<P>::find_lone(Occupancy& occupancy) const {
   std::vector<char> lone(own);
   for (std::uint32_t b = 0; b < own; ++b) {
     lone[b] = occupancy.is_alone(
-        b, periodicity_, [&](BlockCoord there) { return others_tell || owner(there) == comm_.rank(); });
+        b, periodicity_, [&](BlockCoord there) { return others_tell || own_planes(there) == kAllPlanes; });
   }
   return lone;
 }
@@ -27,7 +27,7 @@ void HostEngine<P>::tell_neighbours(Occupancy& occupancy) const {
   for (const Occupant& o : occupancy.blocks()) {
     const std::int32_t plane = component(block_coord(o.block), slabs_.axis());
     for (const std::int32_t side : {-1, 1}) {
-      const int rank = slabs_.owner(periodicity_.wrap(plane + side, slabs_.axis()));
+      const int rank = slabs_.owner(kBlockWidth * periodicity_.wrap(plane + side, slabs_.axis()));
       auto& told = to[static_cast<std::size_t>(rank)];
       const bool known = !told.empty() && told.back().block == o.block;
       if (rank != comm_.rank() && !known) told.push_back(o);

@@ -1,4 +1,4 @@
-// Slabs of the host engine: where they are cut at the start, what their planes cost, and how they change.
+// Slabs of the host engine: where they are cut at the start, what their planes cost, how they change, whose a plane is.
 #include <array>
 #include <cmath>
 #include <type_traits>
@@ -17,6 +17,8 @@ constexpr WorkWeights kHostDouble{.tile = 2000e3, .pack = 490e3, .lone_pack = 16
 template <class P>
 constexpr WorkWeights kWeights = std::is_same_v<P, MixedPrecision> ? kHostMixed : kHostDouble;
 
+static_assert(mpi::kPlanesOfBlock == kBlockWidth);
+
 std::uint64_t whole(double picoseconds) { return static_cast<std::uint64_t>(std::llround(picoseconds)); }
 
 }  // namespace
@@ -25,8 +27,9 @@ template <class P>
 void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
   std::array<mpi::PlaneWork, 3> mine;
   for (const Placement& p : placements) {
-    const BlockCoord stack = stack_of(block_of(p));
-    for (std::size_t axis = 0; axis < 3; ++axis) ++mine[axis][component(stack, static_cast<int>(axis))];
+    for (int axis = 0; axis < 3; ++axis) {
+      ++mine[static_cast<std::size_t>(axis)].nodes[p.node[axis] & -planes_kept_together(axis)];
+    }
   }
   // Slabs across the longest extent of the matter share the fewest nodes.
   std::array<mpi::PlaneWork, 3> all;
@@ -43,15 +46,54 @@ template <class P>
 mpi::PlaneWork HostEngine<P>::work(std::span<const double> more) const {
   constexpr WorkWeights w = kWeights<P>;
   mpi::PlaneWork work;
-  const auto add = [&](BlockCoord block, double cost) { work[component(block, slabs_.axis())] += whole(cost); };
-  for (std::size_t t = 0; t < tiles_.size(); ++t) {
-    add(block_coord(stacks_[t]), w.tile + w.pack * packs_for(tiles_[t].particles));
-  }
-  for (const BlockCoord stack : lone_stack_) add(stack, w.lone_pack / kLanes);
+  const int axis = slabs_.axis();
+  const std::int32_t together = planes_kept_together(axis);
+  // A particle's lane of its pack goes with its plane; the tile and the lanes that stay empty are there on either side
+  // of a cut through the block.
   std::size_t n = 0;
-  if (more.empty()) return work;
-  for_each_particle([&](std::size_t, BlockCoord block) { add(block, more[n++]); });
+  const auto add = [&](std::size_t first_slot, std::uint32_t particles, BlockCoord stack, double lane, double tile) {
+    std::array<std::uint64_t, kStackHeight> of_plane{};
+    for (std::uint32_t i = 0; i < particles; ++i) {
+      of_plane[plane_in_stack(first_slot + i)] += whole(lane) + (more.empty() ? 0 : whole(more[n++]));
+    }
+    const std::int32_t first = kBlockWidth * component(stack, axis);
+    for (std::int32_t plane = 0; plane < kStackHeight; ++plane) {
+      const std::uint64_t cost = of_plane[static_cast<std::size_t>(plane)];
+      if (cost != 0) work.nodes[(first + plane) & -together] += cost;
+    }
+    work.blocks[component(stack, axis)] += whole(tile);
+  };
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    const auto empty = packs_for(tiles_[t].particles) * static_cast<std::uint32_t>(kLanes) - tiles_[t].particles;
+    add(tiles_[t].first_pack * kLanes, tiles_[t].particles, block_coord(stacks_[t]), w.pack / kLanes,
+        w.tile + empty * w.pack / kLanes);
+  }
+  for (std::uint32_t i = 0; i < lone_.particles; ++i) {
+    add(lone_.first_pack * kLanes + i, 1, lone_stack_[i], w.lone_pack / kLanes, 0.0);
+  }
   return work;
+}
+
+template <class P>
+std::int32_t HostEngine<P>::planes_kept_together(int axis) const {
+  if (divides_blocks()) return 1;
+  return axis == 2 ? kStackHeight : kBlockWidth;
+}
+
+template <class P>
+std::size_t HostEngine<P>::plane_in_stack(std::size_t slot) const {
+  const std::int32_t packed = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
+  return static_cast<std::size_t>(((packed >> (8 * slabs_.axis())) & 255) - kNodeBias);
+}
+
+template <class P>
+std::uint32_t HostEngine<P>::own_planes(BlockCoord block) const {
+  if (comm_.size() == 1) return kAllPlanes;
+  std::uint32_t own = 0;
+  for (std::int32_t n = 0; n < kBlockWidth; ++n) {
+    if (slabs_.owner(first_plane(block) + n) == comm_.rank()) own |= 1U << n;
+  }
+  return own;
 }
 
 template <class P>

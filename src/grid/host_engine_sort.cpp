@@ -1,4 +1,4 @@
-// Sorting: every particle to the rank that owns its block, to its tile, and inside the tile to the order of its cell.
+// Sorting: every particle to the rank that owns its node, to its tile, and inside the tile to the order of its cell.
 #include <algorithm>
 #include <cstring>
 #include <string>
@@ -78,7 +78,7 @@ void HostEngine<P>::migrate(std::vector<Placement>& placements) {
   std::vector<std::vector<std::byte>> to(static_cast<std::size_t>(comm_.size()));
   std::vector<std::byte> record(bytes);
   std::erase_if(placements, [&](const Placement& p) {
-    const int rank = owner(block_of(p));
+    const int rank = owner(p);
     if (rank == comm_.rank()) return false;
     auto& message = to[static_cast<std::size_t>(rank)];
     put(message, p.node, 3);

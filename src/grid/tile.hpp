@@ -39,6 +39,10 @@ constexpr BlockCoord neighbour_offset(int n) {
   return {n / (3 * kNeighboursAlongZ) - 1, n / kNeighboursAlongZ % 3 - 1, n % kNeighboursAlongZ - 1};
 }
 
+constexpr int neighbour_at(BlockCoord offset) {
+  return ((offset.x + 1) * 3 + offset.y + 1) * kNeighboursAlongZ + offset.z + 1;
+}
+
 /// Which planes of a neighbour, of its four along an axis, a tile can reach: bit 0 for the lowest.
 constexpr unsigned planes_in_reach(BlockCoord offset, int axis) {
   constexpr unsigned kAll = (1U << kBlockWidth) - 1;

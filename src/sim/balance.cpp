@@ -23,12 +23,18 @@ const GravityWeights& weights_of(GravityMethod method) {
 // Moving particles and sorting them again costs a few steps: what is won must be worth it.
 constexpr double kLeastGain = 0.02;  // of the mean work
 
-double imbalance_of(const std::vector<std::uint64_t>& shares) {
+double largest(const std::vector<std::uint64_t>& shares) {
+  return static_cast<double>(*std::ranges::max_element(shares));
+}
+
+double mean(const std::vector<std::uint64_t>& shares) {
   std::uint64_t sum = 0;
   for (const std::uint64_t s : shares) sum += s;
-  if (sum == 0) return 1.0;
-  return static_cast<double>(*std::ranges::max_element(shares)) * static_cast<double>(shares.size()) /
-         static_cast<double>(sum);
+  return static_cast<double>(sum) / static_cast<double>(shares.size());
+}
+
+double imbalance_of(const std::vector<std::uint64_t>& shares) {
+  return mean(shares) > 0.0 ? largest(shares) / mean(shares) : 1.0;
 }
 
 }  // namespace
@@ -43,16 +49,20 @@ std::vector<double> gravity_work(const gravity::Solver& solver, int interval) {
 void Balance::at_window_start(grid::Engine& engine, const gravity::Solver* solver) {
   if (comm_.size() == 1) return;
   const mpi::PlaneWork mine = engine.work(solver != nullptr ? gravity_work(*solver, interval_) : std::vector<double>{});
-  double imbalance = imbalance_of(comm_.allgather(mpi::total(mine)));
+  const std::vector<std::uint64_t> now = comm_.allgather(mpi::total(mine));
+  double imbalance = imbalance_of(now);
   const bool uneven = parallel_.balance == BalanceMode::kAuto && imbalance > parallel_.imbalance;
   if (uneven || parallel_.balance == BalanceMode::kAlways) {
     const mpi::PlaneWork all = mpi::sum_over_ranks(mine, comm_);
     const mpi::Slabs slabs = mpi::Slabs::balanced(engine.slabs().axis(), all, comm_.size());
-    const double best = imbalance_of(slabs.shares(all));
-    if (parallel_.balance == BalanceMode::kAlways || best < imbalance - kLeastGain) {
+    const std::vector<std::uint64_t> then = slabs.shares(all);
+    // What counts is the busiest rank: a cut through blocks adds to the mean.
+    const bool better = largest(then) < largest(now) - kLeastGain * mean(now);
+    const bool moved = slabs.cuts() != engine.slabs().cuts();
+    if (parallel_.balance == BalanceMode::kAlways || (better && moved)) {
       engine.cut(slabs);
       ++state_.recuts;
-      imbalance = best;
+      imbalance = imbalance_of(then);
     }
   }
   ++state_.windows;

@@ -1,10 +1,11 @@
-// Where slabs are cut: the busiest rank has the least that whole planes allow, for any number of ranks.
+// Where slabs are cut: the busiest rank has the least that planes of nodes allow, for any number of ranks.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <functional>
 #include <numeric>
 #include <random>
+#include <set>
 
 #include "mpi/slabs.hpp"
 
@@ -34,7 +35,7 @@ TEST(Slabs, NoCutsLeaveLessToTheBusiestRank) {
     PlaneWork all;
     for (std::size_t p = 0; p < planes; ++p) {
       work[p] = random() % 3 == 0 ? 0 : random() % 1000;
-      all[static_cast<std::int32_t>(3 * p) - 7] = work[p];  // planes between them are empty
+      all.nodes[static_cast<std::int32_t>(3 * p) - 7] = work[p];  // planes between them are empty
     }
     for (int ranks = 1; ranks <= 5; ++ranks) {
       const std::vector<std::uint64_t> shares = Slabs::balanced(2, all, ranks).shares(all);
@@ -45,10 +46,62 @@ TEST(Slabs, NoCutsLeaveLessToTheBusiestRank) {
   }
 }
 
+// The work of the planes [first, last) with that of every block they are a part of.
+std::uint64_t slab_work(const PlaneWork& all, std::int32_t first, std::int32_t last) {
+  std::uint64_t work = 0;
+  std::set<std::int32_t> blocks;
+  for (std::int32_t plane = first; plane < last; ++plane) {
+    work += all.nodes.at(plane);
+    blocks.insert(block_of_plane(plane));
+  }
+  for (const std::int32_t block : blocks) work += all.blocks.at(block);
+  return work;
+}
+
+std::uint64_t least_maximum(const PlaneWork& all, std::int32_t first, std::int32_t end, int ranks) {
+  if (ranks == 1) return slab_work(all, first, end);
+  std::uint64_t best = std::numeric_limits<std::uint64_t>::max();
+  for (std::int32_t cut = first; cut <= end; ++cut) {
+    best = std::min(best, std::max(slab_work(all, first, cut), least_maximum(all, cut, end, ranks - 1)));
+  }
+  return best;
+}
+
+// A block that a cut divides costs both sides in full: cuts run through blocks only where that is worth it.
+TEST(Slabs, DividedBlocksCountOnBothSides) {
+  std::mt19937_64 random(2);
+  for (int trial = 0; trial < 60; ++trial) {
+    const auto first = -static_cast<std::int32_t>(random() % 7);
+    const auto end = first + 1 + static_cast<std::int32_t>(random() % 12);
+    PlaneWork all;
+    for (std::int32_t plane = first; plane < end; ++plane) {
+      all.nodes[plane] = random() % 100;
+      all.blocks.try_emplace(block_of_plane(plane), random() % 200);
+    }
+    for (int ranks = 1; ranks <= 4; ++ranks) {
+      const Slabs slabs = Slabs::balanced(0, all, ranks);
+      ASSERT_EQ(largest(slabs.shares(all)), least_maximum(all, first, end, ranks)) << trial << ", ranks " << ranks;
+      std::int32_t begin = first;
+      for (std::size_t rank = 0; rank + 1 < static_cast<std::size_t>(ranks); ++rank) {
+        const std::int32_t cut = std::min(slabs.cuts()[rank], end);
+        EXPECT_EQ(slabs.shares(all)[rank], slab_work(all, begin, cut));
+        begin = cut;
+      }
+    }
+  }
+  // Two blocks of even planes between two ranks: cut between them. Between three, through both.
+  PlaneWork two;
+  for (std::int32_t plane = 0; plane < 8; ++plane) two.nodes[plane] = 10;
+  two.blocks = {{0, 5}, {1, 5}};
+  EXPECT_EQ(Slabs::balanced(0, two, 2).cuts(), std::vector<std::int32_t>{4});
+  EXPECT_TRUE(Slabs::balanced(0, two, 2).keep_whole(kPlanesOfBlock));
+  EXPECT_FALSE(Slabs::balanced(0, two, 3).keep_whole(kPlanesOfBlock));
+}
+
 // Among cuts as good, the even ones: nobody starves because another rank must have much anyway.
 TEST(Slabs, OneHeavyPlaneDoesNotStarveOthers) {
-  PlaneWork all{{0, 100}};
-  for (std::int32_t plane = 1; plane <= 60; ++plane) all[plane] = 1;
+  PlaneWork all{{{0, 100}}, {}};
+  for (std::int32_t plane = 1; plane <= 60; ++plane) all.nodes[plane] = 1;
   const std::vector<std::uint64_t> shares = Slabs::balanced(0, all, 4).shares(all);
   EXPECT_EQ(shares[0], 100U);
   EXPECT_GE(std::min({shares[1], shares[2], shares[3]}), 5U);
@@ -56,7 +109,7 @@ TEST(Slabs, OneHeavyPlaneDoesNotStarveOthers) {
 
 TEST(Slabs, EveryPlaneHasOneOwnerInTheOrderOfRanks) {
   PlaneWork all;
-  for (std::int32_t plane = -50; plane < 50; ++plane) all[plane] = 10;
+  for (std::int32_t plane = -50; plane < 50; ++plane) all.nodes[plane] = 10;
   for (const int ranks : {1, 2, 3, 7, 64, 100, 333}) {
     const Slabs slabs = Slabs::balanced(0, all, ranks);
     int previous = 0;
@@ -78,17 +131,22 @@ TEST(Slabs, WithoutWork) {
 
 // A tenth of the work may fly as far as it wants.
 TEST(Slabs, ExtentIsThatOfTheBulk) {
-  PlaneWork all{{-100000, 40}, {100000, 40}};
-  for (std::int32_t plane = 10; plane < 20; ++plane) all[plane] = 100;
+  PlaneWork all{{{-100000, 40}, {100000, 40}}, {}};
+  for (std::int32_t plane = 10; plane < 20; ++plane) all.nodes[plane] = 100;
   EXPECT_EQ(extent(all), 10);
 }
 
 TEST(Slabs, WorkOfAllRanksOnAllRanks) {
   const Comm comm;
-  const PlaneWork all = sum_over_ranks({{comm.rank(), 5}, {1000, 1}}, comm);
-  ASSERT_EQ(all.size(), static_cast<std::size_t>(comm.size()) + 1);
-  EXPECT_EQ(all.at(comm.size() - 1), 5U);
-  EXPECT_EQ(all.at(1000), static_cast<std::uint64_t>(comm.size()));
+  const auto rank = static_cast<std::uint64_t>(comm.rank());
+  const PlaneWork all = sum_over_ranks({{{comm.rank(), 5}, {1000, 1}}, {{comm.rank(), 2}, {250, rank}}}, comm);
+  ASSERT_EQ(all.nodes.size(), static_cast<std::size_t>(comm.size()) + 1);
+  EXPECT_EQ(all.nodes.at(comm.size() - 1), 5U);
+  EXPECT_EQ(all.nodes.at(1000), static_cast<std::uint64_t>(comm.size()));
+  // Parts of one plane of blocks: the largest.
+  ASSERT_EQ(all.blocks.size(), static_cast<std::size_t>(comm.size()) + 1);
+  EXPECT_EQ(all.blocks.at(comm.size() - 1), 2U);
+  EXPECT_EQ(all.blocks.at(250), static_cast<std::uint64_t>(comm.size()) - 1);
 }
 
 }  // namespace

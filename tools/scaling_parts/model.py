@@ -1,17 +1,16 @@
 """Performance model: the time of a step on many ranks from particles, halo area, latency, bandwidth and gravity mesh.
 
-Two equal spheres that touch at 15 degrees, cut into slabs on planes of blocks of four cells: the matter of the flagship
-impact. Cells are the unit of length, seconds that of time. docs/scaling.md explains the terms.
+Two equal spheres before they touch, cut into slabs across their line of centres, between planes of nodes: the matter of
+the flagship impact. Cells are the unit of length, seconds that of time. docs/scaling.md explains the terms.
 """
 
+import bisect
 import dataclasses
 import math
 
 BLOCK = 4  # cells along an edge of a block
 CHANNELS = 8  # values of a node that travel
-HALO_PLANES = 2  # planes of nodes that a rank reaches behind a cut
-MARGIN = 2  # cells that a tile reaches beyond its particles
-HALO_MARGIN = MARGIN + 0.5 * BLOCK  # and whole blocks travel
+MARGIN = 2  # nodes that a particle reaches beyond the nearest one until the next sorting
 TILE = 21.6  # particles that cost as much as a tile does by itself, on a host core (breccia_bench work)
 # Share of a padded mesh that a transposition moves: halves that are zero stay where they are. From the bytes that four
 # ranks sent (docs/performance.md): 12.9 MB an evaluation at 1e6 particles.
@@ -43,86 +42,134 @@ class Case:
     per_cell: float = 1.412  # particles in a cell
     interval: int = 32  # steps between evaluations of gravity; 0: no gravity
     mesh_cell: float = 1.16  # mesh cell in grid cells: 1.3 mean distances of particles
-    angle: float = math.radians(15.0)  # of the line of centres with the axis that slabs cut across
+    gap: float = 0.01  # between the spheres, in diameters
 
     @property
     def radius(self):
         """Of a sphere [cells]."""
         return (0.5 * self.particles / self.per_cell * 3.0 / (4.0 * math.pi)) ** (1.0 / 3.0)
 
-
-def plane_cells(case):
-    """Cells of matter in each plane of blocks across both spheres, from one end to the other."""
-    radius = case.radius
-    apart = 2.0 * radius * math.cos(case.angle)
-    planes = max(1, math.ceil((apart + 2.0 * radius) / BLOCK))
-
-    def below(x):
-        """Volume of both spheres up to x."""
-
-        def cap(h):
-            h = min(max(h, 0.0), 2.0 * radius)
-            return math.pi * h * h * (radius - h / 3.0)
-
-        return cap(x) + cap(x - apart)
-
-    return [below(BLOCK * (p + 1)) - below(BLOCK * p) for p in range(planes)]
+    @property
+    def apart(self):
+        """Centre to centre [cells]."""
+        return 2.0 * self.radius * (1.0 + self.gap)
 
 
-def union_of_discs(a, b, apart):
-    """Area of two discs with radii a and b whose centres are so far apart; a radius of 0 is no disc."""
-    if min(a, b) <= 0.0 or apart >= a + b:
-        return math.pi * (a * a + b * b)
-    if apart <= abs(a - b):
-        return math.pi * max(a, b) ** 2
-    at = (apart**2 + a**2 - b**2) / (2.0 * apart)  # of the common chord, from the first centre
-    lens = (a**2 * math.acos(at / a) + b**2 * math.acos((apart - at) / b)
-            - apart * math.sqrt(max(0.0, a**2 - at**2)))
-    return math.pi * (a * a + b * b) - lens
+def centres(case):
+    """Where the spheres stand along the axis that slabs cut across; the origin lies between them."""
+    return (-0.5 * case.apart, 0.5 * case.apart)
 
 
-def section(case, x, margin):
-    """Cells of a cut through the spheres at x cells from the end, with a margin around them [cells]."""
-    radius = case.radius
-
-    def disc(centre):
-        square = radius**2 - (x - centre) ** 2
-        return math.sqrt(square) + margin if square > 0.0 else 0.0
-
-    apart = 2.0 * radius
-    return union_of_discs(disc(radius), disc(radius + apart * math.cos(case.angle)), apart * math.sin(case.angle))
+def planes_of(case):
+    """Planes of nodes with matter nearest to them, first and last."""
+    end = math.floor(0.5 * case.apart + case.radius)
+    return -end, end
 
 
-def cuts(work, ranks):
-    """Ends of slabs, as indices of planes, that leave the least work to the busiest rank (mpi/slabs.cpp)."""
+def cells_up_to(case, x):
+    """Volume of both spheres up to x."""
+
+    def cap(h):
+        h = min(max(h, 0.0), 2.0 * case.radius)
+        return math.pi * h * h * (case.radius - h / 3.0)
+
+    return sum(cap(x - (centre - case.radius)) for centre in centres(case))
+
+
+def widest(case, first, last):
+    """Radius of the largest section through the spheres along the planes of nodes first ... last; -1: none. A cell of one
+    or two particles has one where its node lies inside the sphere, on average: half of the cell does."""
+    radius = -1.0
+    for centre in centres(case):
+        away = max(first - centre, centre - last, 0.0)
+        if away <= case.radius:
+            radius = max(radius, math.sqrt(case.radius**2 - away**2))
+    return radius
+
+
+def columns(radius, margin):
+    """Columns of blocks across the slabs that nodes meet which lie in a disc around the origin, or `margin` nodes beside
+    it. Counted row by row: for large discs the area and half the perimeter of a square around it, 8 radius blocks."""
+    if radius < 0.0:
+        return 0
+    count = 0
+    reach = math.floor(radius) + margin
+    for row in range(-reach // BLOCK, reach // BLOCK + 1):
+        nearest = max(0, BLOCK * row - margin, -(BLOCK * row + BLOCK - 1) - margin)
+        end = math.floor(math.sqrt(max(0.0, radius**2 - nearest**2))) + margin
+        count += end // BLOCK - -end // BLOCK + 1
+    return count
+
+
+@dataclasses.dataclass(frozen=True)
+class Planes:
+    """Work of each plane of nodes, from the first one on, and of the tiles of each plane of blocks (mpi/slabs.hpp)."""
+
+    first: int
+    before: list  # work of all planes before
+    tiles: dict
+
+    def work(self, begin, end):
+        """Of the slab of the planes begin ... end - 1, counted from the first. A block that is cut costs both sides."""
+        if begin == end:
+            return 0.0
+        blocks = range((self.first + begin) // BLOCK, (self.first + end - 1) // BLOCK + 1)
+        return self.before[end] - self.before[begin] + sum(self.tiles[b] for b in blocks)
+
+
+def planes_with_work(case, particle, tile):
+    first, last = planes_of(case)
     before = [0.0]
-    for w in work:
-        before.append(before[-1] + w)
+    for plane in range(first, last + 1):
+        cells = cells_up_to(case, plane + 0.5) - cells_up_to(case, plane - 0.5)
+        before.append(before[-1] + particle * case.per_cell * cells)
+    tiles = {b: tile * columns(widest(case, BLOCK * b, BLOCK * b + BLOCK - 1), 0)
+             for b in range(first // BLOCK, last // BLOCK + 1)}
+    return Planes(first, before, tiles)
 
-    def packed(limit):
-        ends, start = [], 0.0
-        for p in range(1, len(before)):
-            if before[p] - start > limit:
-                ends.append(p - 1)
-                start = before[p - 1]
-        return ends
 
-    low, high = max(max(work), before[-1] / ranks), before[-1]
-    for _ in range(60):
+def cuts(planes, ranks):
+    """Ends of slabs, as indices of planes, that leave the least work to the busiest rank and are as even as that allows
+    (mpi/slabs.cpp)."""
+    size = len(planes.before) - 1
+
+    def furthest(begin, limit):
+        return bisect.bisect_right(range(begin + 1, size + 1), limit, key=lambda e: planes.work(begin, e)) + begin
+
+    def fits(limit):
+        at = 0
+        for _ in range(ranks):
+            at = furthest(at, limit) if at < size else size
+        return at == size
+
+    low, high = 0.0, planes.work(0, size)
+    for _ in range(40):
         middle = 0.5 * (low + high)
-        if len(packed(middle)) < ranks:
-            high = middle
-        else:
-            low = middle
-    return packed(high)
+        low, high = (low, middle) if fits(middle) else (middle, high)
+    first = [size] * (ranks + 1)  # of each rank, so that those behind it can hold the rest
+    for k in range(ranks - 1, 0, -1):
+        at = first[k + 1]
+        while at > 0 and planes.work(at - 1, first[k + 1]) <= high:
+            at -= 1
+        first[k] = at
+    ends, begin = [], 0
+    for k in range(1, ranks):
+        share = planes.work(begin, size) / (ranks - k + 1)
+        least, most = max(min(begin + 1, size), first[k]), furthest(begin, high) if begin < size else size
+        begin = min(range(least, max(least, most) + 1), key=lambda e: abs(planes.work(begin, e) - share))
+        if begin < size:
+            ends.append(begin)
+    return ends
 
 
 def halo_bytes(case, at, word):
-    """Bytes that a rank sends in a step across a cut at plane `at`: sums of the nodes that its particles reach there, and
-    velocities of its own that particles there reach."""
-    x = BLOCK * at
-    below, above = (max(section(case, x + reach, HALO_MARGIN) for reach in (0, side * MARGIN)) for side in (-1, 1))
-    return HALO_PLANES * (below + above) * CHANNELS * word
+    """Bytes that each of two ranks sends in a step across a cut before plane `at`: sums of the nodes that its particles
+    reach behind it, and velocities of its own that particles there reach."""
+    found = 0
+    for depth in range(MARGIN):
+        found += columns(widest(case, at - MARGIN + depth, at - 1), MARGIN)  # particles below, nodes of at + depth
+        found += columns(widest(case, at, at + MARGIN - 1 - depth), MARGIN)
+    return found * BLOCK**2 * CHANNELS * word
 
 
 @dataclasses.dataclass(frozen=True)
@@ -165,23 +212,20 @@ def gravity_seconds(case, machine, ranks, share):
 
 def step(case, machine, ranks):
     """The step of `case` on `ranks` ranks."""
-    cells = plane_cells(case)
-    # Engine work of a plane: particles, and its blocks.
-    blocks = [section(case, BLOCK * (p + 0.5), 0.5 * BLOCK) / BLOCK**2 for p in range(len(cells))]
-    work = [machine.particle * case.per_cell * c + machine.tile * b for c, b in zip(cells, blocks)]
-    near = [machine.gravity_particle * case.per_cell * c for c in cells]
-    if case.interval:
-        work = [w + n / case.interval for w, n in zip(work, near)]
-    ends = [0, *cuts(work, ranks), len(cells)]
+    particle = machine.particle + (machine.gravity_particle / case.interval if case.interval else 0.0)
+    planes = planes_with_work(case, particle, machine.tile)
+    ends = [0, *cuts(planes, ranks), len(planes.before) - 1]
     slabs = list(zip(ends, ends[1:]))
-    busiest = max(slabs, key=lambda s: sum(work[s[0] : s[1]]))
-    most = sum(work[busiest[0] : busiest[1]])
-    sent = [sum(halo_bytes(case, at, machine.word) for at in slab if 0 < at < len(cells)) for slab in slabs]
+    shares = [planes.work(*slab) for slab in slabs]
+    most = max(shares)
+    busiest = slabs[shares.index(most)]
+    crossing = {end: halo_bytes(case, planes.first + end, machine.word) for end in ends[1:-1]}
+    sent = [sum(crossing.get(end, 0) for end in slab) for slab in slabs]
     neighbours = 0 if ranks == 1 else 1 if len(slabs) == 2 else 2
     # Two phases, each with a message to each neighbour.
     exchange = 2 * neighbours * machine.latency + max(sent) / machine.bandwidth if len(slabs) > 1 else 0.0
     gravity = messages = 0.0
-    share = case.per_cell * sum(cells[busiest[0] : busiest[1]])
+    share = (planes.before[busiest[1]] - planes.before[busiest[0]]) / particle
     if case.interval:
         gravity, messages = (s / case.interval for s in gravity_seconds(case, machine, ranks, share))
         most -= machine.gravity_particle * share / case.interval
@@ -191,7 +235,7 @@ def step(case, machine, ranks):
         gravity=gravity,
         gravity_messages=messages,
         halo_bytes=max(sent),
-        imbalance=max(sum(work[a:b]) for a, b in slabs) * ranks / sum(work),
+        imbalance=most * ranks / sum(shares),
         busy_ranks=len(slabs),
     )
 
@@ -223,8 +267,7 @@ def fit(runs, network, name="this machine", word=4):
     rows, values = [], []
     for run in runs:
         case = Case(run["particles"], run["per_cell"])
-        blocks = sum(section(case, BLOCK * (p + 0.5), 0.5 * BLOCK) / BLOCK**2 for p in range(len(plane_cells(case))))
-        rows.append([run["particles"], blocks])
+        rows.append([run["particles"], sum(planes_with_work(case, 0.0, 1.0).tiles.values())])
         values.append(run["engine"])
     if len({run["particles"] for run in runs}) > 1:
         particle, tile = least_squares(rows, values)
