@@ -37,6 +37,7 @@ class Machine:
     gravity_node: float  # an evaluation's transforms, of a mesh node [s]
     word: int = 4  # bytes of a grid value
     hidden: float = 0.0  # share of the halo's time that interior work hides
+    whole_blocks: bool = False  # slabs are cut between blocks only
 
 
 @dataclasses.dataclass(frozen=True)
@@ -109,11 +110,13 @@ def columns(radius, margin):
 
 @dataclasses.dataclass
 class Planes:
-    """Work of each plane of nodes, from the first one on, and of the tiles of each plane of blocks (mpi/slabs.hpp)."""
+    """Work of each plane of nodes, or of each `step` of them, from the first one on, and of the tiles of each plane of
+    blocks (mpi/slabs.hpp)."""
 
     first: int
     before: list  # work of all planes before
     tiles: dict
+    step: int = 1
 
     def __post_init__(self):
         self.tiles_up_to = dict(zip(sorted(self.tiles), itertools.accumulate(w for _, w in sorted(self.tiles.items()))))
@@ -122,20 +125,22 @@ class Planes:
         """Of the slab of the planes begin ... end - 1, counted from the first. A block that is cut costs both sides."""
         if begin == end:
             return 0.0
-        one, last = (self.first + begin) // BLOCK, (self.first + end - 1) // BLOCK
+        one, last = (self.first + self.step * begin) // BLOCK, (self.first + self.step * end - 1) // BLOCK
         tiles = self.tiles_up_to[last] - self.tiles_up_to[one] + self.tiles[one]
         return self.before[end] - self.before[begin] + tiles
 
 
-def planes_with_work(case, particle, tile):
+def planes_with_work(case, particle, tile, step=1):
     first, last = planes_of(case)
+    first -= first % step
+    last += -(last + 1) % step
     before = [0.0]
-    for plane in range(first, last + 1):
-        cells = cells_up_to(case, plane + 0.5) - cells_up_to(case, plane - 0.5)
+    for plane in range(first, last + 1, step):
+        cells = cells_up_to(case, plane + step - 0.5) - cells_up_to(case, plane - 0.5)
         before.append(before[-1] + particle * case.per_cell * cells)
     tiles = {b: tile * columns(widest(case, BLOCK * b, BLOCK * b + BLOCK - 1), 0)
              for b in range(first // BLOCK, last // BLOCK + 1)}
-    return Planes(first, before, tiles)
+    return Planes(first, before, tiles, step)
 
 
 def cuts(planes, ranks):
@@ -223,13 +228,13 @@ def gravity_seconds(case, machine, ranks, share):
 def step(case, machine, ranks):
     """The step of `case` on `ranks` ranks."""
     particle = machine.particle + (machine.gravity_particle / case.interval if case.interval else 0.0)
-    planes = planes_with_work(case, particle, machine.tile)
+    planes = planes_with_work(case, particle, machine.tile, BLOCK if machine.whole_blocks else 1)
     ends = [0, *cuts(planes, ranks), len(planes.before) - 1]
     slabs = list(zip(ends, ends[1:]))
     shares = [planes.work(*slab) for slab in slabs]
     most = max(shares)
     busiest = slabs[shares.index(most)]
-    crossing = {end: halo_bytes(case, planes.first + end, machine.word) for end in ends[1:-1]}
+    crossing = {end: halo_bytes(case, planes.first + planes.step * end, machine.word) for end in ends[1:-1]}
     sent = [sum(crossing.get(end, 0) for end in slab) for slab in slabs]
     neighbours = 0 if ranks == 1 else 1 if len(slabs) == 2 else 2
     # Two phases, each with a message to each neighbour.
@@ -315,4 +320,5 @@ H100 = Machine(
     gravity_particle=5e-9,
     gravity_node=0.15e-9,
     hidden=0.8,
+    whole_blocks=True,
 )
