@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <limits>
 #include <optional>
-#include <ranges>
 #include <span>
 
 namespace breccia::mpi {
@@ -40,17 +39,31 @@ struct Row {
 
   // The furthest end of a slab from `first` with at most `limit`.
   [[nodiscard]] std::size_t furthest(std::size_t first, std::uint64_t limit) const {
-    const auto ends = std::views::iota(first + 1, size() + 1);
-    return first + static_cast<std::size_t>(
-                       std::ranges::partition_point(ends, [&](std::size_t end) { return work(first, end) <= limit; }) -
-                       ends.begin());
+    std::size_t fits = first;
+    std::size_t end = size();
+    while (fits < end) {
+      const std::size_t middle = end - (end - fits) / 2;
+      if (work(first, middle) <= limit) {
+        fits = middle;
+      } else {
+        end = middle - 1;
+      }
+    }
+    return fits;
   }
   // The earliest begin of a slab up to `last` with at most `limit`.
   [[nodiscard]] std::size_t earliest(std::size_t last, std::uint64_t limit) const {
-    const auto begins = std::views::iota(std::size_t{0}, last);
-    return static_cast<std::size_t>(
-        std::ranges::partition_point(begins, [&](std::size_t begin) { return work(begin, last) > limit; }) -
-        begins.begin());
+    std::size_t fits = last;
+    std::size_t begin = 0;
+    while (begin < fits) {
+      const std::size_t middle = begin + (fits - begin) / 2;
+      if (work(middle, last) <= limit) {
+        fits = middle;
+      } else {
+        begin = middle + 1;
+      }
+    }
+    return fits;
   }
   [[nodiscard]] bool fits(std::uint64_t limit, int ranks) const {
     std::size_t at = 0;

@@ -159,6 +159,16 @@ TEST(HardCases, BeyondTheKeysIsAUsageError) {
   EXPECT_THROW(engine_with(setup_for(Precision::kMixed), {{1.1e10, 0, 0}}, {{0, 0, 0}}, comm), UsageError);
 }
 
+// A cut through the block beside a particle: what lies behind it is not known here, so it does not go without grid.
+TEST(HardCases, NeighboursAcrossACutThroughABlock) {
+  const mpi::Comm comm;
+  const auto engine =
+      engine_with(setup_for(Precision::kMixed), {{3.0 * kCell, 0, 0}, {6.0 * kCell, 0, 0}}, {{}, {}}, comm);
+  engine->cut(mpi::Slabs(0, std::vector<std::int32_t>(static_cast<std::size_t>(comm.size()) - 1, 6)));
+  EXPECT_EQ(engine->stats().particles, comm.size() == 1 ? 2U : comm.rank() == 0 || comm.rank() + 1 == comm.size());
+  EXPECT_EQ(comm.sum(engine->stats().lone_particles), 0U);
+}
+
 // Several cells in one step, over several slabs: the particle arrives at its new owner with everything it carries.
 TEST(HardCases, ParticlesFindTheirOwnersAgain) {
   const mpi::Comm comm;
