@@ -17,7 +17,7 @@ struct Layout {
 };
 
 /// Chooses boxes and deals the particles out to them; a spacing of 0 is found from the particles. Collective.
-Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi::Comm& comm);
+Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi::Comm& comm, int threads);
 
 /// What the choice of a method needs to know. Collective.
 Matter matter_of(const Layout& layout, const mpi::Comm& comm);

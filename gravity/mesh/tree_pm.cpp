@@ -46,7 +46,7 @@ void TreePm<Real>::evaluate(ParticlesView particles, std::span<Vec3d> accelerati
   check_sizes(particles, acceleration, potential);
   Phases laying;
   Layout layout;
-  laying.time(Phase::kBoxes, [&] { layout = lay_boxes(particles, parameters_.mesh, comm_); });
+  laying.time(Phase::kBoxes, [&] { layout = lay_boxes(particles, parameters_.mesh, comm_, threads_); });
   parameters_.mesh.particle_spacing = layout.spacing;
   evaluate_in(layout, particles, acceleration, potential);
   stats_.phases[Phase::kBoxes] = laying[Phase::kBoxes];

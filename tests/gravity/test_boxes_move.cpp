@@ -49,7 +49,7 @@ TEST(MovingBoxes, AParticleFeelsNothingAtTheBorder) {
   for (int k = 0; k <= 40; ++k) {
     const double r = (1.05 + 0.02 * k) * kRadius;
     cloud.position[probe] = {0.6 * r, 0.0, 0.8 * r};
-    const bool inside = lay_boxes({cloud.position, cloud.mass}, settings().mesh, self).set[probe] > 0;
+    const bool inside = lay_boxes({cloud.position, cloud.mass}, settings().mesh, self, 1).set[probe] > 0;
     (inside ? was_inside : was_outside) = true;
     const Vec3d should = exact(cloud).acceleration[probe];
     const Vec3d error = by(GravityMethod::kTreePm, cloud).field.acceleration[probe] - should;

@@ -199,7 +199,7 @@ TEST(Boxes, FollowTheDenseBodies) {
   const double radius = 5e4;
   const double spacing = radius * std::cbrt(4.0 / 3.0 * kPi / 4000.0);
   Cloud cloud = spheres(4000, {{0, 0, 0}, {2e6, 1e6, 0}}, radius);
-  std::vector<Box> boxes = choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self);
+  std::vector<Box> boxes = choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1);
   ASSERT_EQ(boxes.size(), 2U);
   for (const Box& b : boxes) {
     EXPECT_LT(b.high.x - b.low.x, 2.01 * radius);
@@ -207,13 +207,13 @@ TEST(Boxes, FollowTheDenseBodies) {
   }
   // Close by, one mesh over both is cheaper than two and the tree between them.
   cloud = spheres(4000, {{0, 0, 0}, {1.5e5, 0, 0}}, radius);
-  EXPECT_EQ(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self).size(), 1U);
+  EXPECT_EQ(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).size(), 1U);
   // Debris is no body, however much of it there is; nor is a body too light or without enough particles.
   cloud = spheres(8000, {{0, 0, 0}}, 4e7);
-  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self).empty());
+  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).empty());
   cloud = spheres(500, {{0, 0, 0}}, 0.5 * radius);
-  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self).empty());
-  EXPECT_TRUE(choose_boxes({}, spacing, 1.3 * spacing, self).empty());
+  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).empty());
+  EXPECT_TRUE(choose_boxes({}, spacing, 1.3 * spacing, self, 1).empty());
 }
 
 TEST(Boxes, SpacingOfTheDenseParticles) {
