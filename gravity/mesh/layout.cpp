@@ -16,14 +16,18 @@ Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi:
       if (layout.boxes[k].contains(particles.position[i])) layout.set[i] = static_cast<std::uint8_t>(k + 1);
     }
   }
+  for (std::size_t k = 0; k <= layout.boxes.size(); ++k) {
+    const auto here = std::count(layout.set.begin(), layout.set.end(), static_cast<std::uint8_t>(k));
+    layout.count.push_back(static_cast<std::uint64_t>(here));
+  }
+  comm.sum(std::span<std::uint64_t>(layout.count));
   return layout;
 }
 
-Matter matter_of(const Layout& layout, const mpi::Comm& comm) {
+Matter matter_of(const Layout& layout) {
   Matter matter;
-  const auto outside = std::count(layout.set.begin(), layout.set.end(), std::uint8_t{0});
-  matter.particles = comm.sum(static_cast<std::uint64_t>(layout.set.size()));
-  matter.in_boxes = matter.particles - comm.sum(static_cast<std::uint64_t>(outside));
+  for (const std::uint64_t n : layout.count) matter.particles += n;
+  matter.in_boxes = matter.particles - layout.count[0];
   for (const Box& box : layout.boxes) matter.mesh_nodes += mesh_nodes(box, layout.cell);
   matter.boxes = static_cast<int>(layout.boxes.size());
   return matter;

@@ -5,6 +5,7 @@
 #include <random>
 
 #include "breccia/error.hpp"
+#include "gravity/mesh/block_sieve.hpp"
 #include "gravity/mesh/box_mesh.hpp"
 #include "gravity/mesh/boxes.hpp"
 #include "gravity/mesh/clusters.hpp"
@@ -192,6 +193,46 @@ Cloud spheres(std::size_t each, std::initializer_list<Vec3d> centres, double rad
   std::mt19937_64 random(11);
   for (const Vec3d c : centres) add_ball(cloud, each, c, radius, random);
   return cloud;
+}
+
+bool same(const Box& a, const Box& b) {
+  return a.low.x == b.low.x && a.low.y == b.low.y && a.low.z == b.low.z && a.high.x == b.high.x &&
+         a.high.y == b.high.y && a.high.z == b.high.z;
+}
+
+// A body that is wide in blocks among debris in more blocks than the sieve has counters, dealt into several pieces.
+TEST(BlockSieve, CountsCrowdedBlocksLikeAllBlocks) {
+  Cloud cloud = spheres(30000, {{0, 0, 0}}, 5e4);
+  std::mt19937_64 random(5);
+  add_ball(cloud, 70000, {0, 0, 0}, 1e7, random);
+  const ParticlesView particles{cloud.position, cloud.mass};
+  constexpr double kWidth = 8e3;
+  constexpr std::int64_t kLeast = 20;
+  const Blocks all = count_in_blocks(particles, kWidth);
+  ASSERT_GT(all.all().size(), std::size_t{1} << 16);
+  for (const int threads : {1, 3}) {
+    const BlockSieve sieve(particles, kWidth, threads);
+    Blocks some;
+    sieve.count_crowded(kLeast, some);
+    EXPECT_LT(some.all().size(), all.all().size() / 10);
+    // Those next to the crowded ones, too, without counting again what is known.
+    std::vector<BlockIndex> next;
+    for (const Block& b : some.all()) next.push_back({b.index.x, b.index.y, b.index.z + 1});
+    sieve.count(next, some);
+    double mass = 0.0;
+    for (const Block& b : all.all()) {
+      mass += b.mass;
+      const std::int64_t place = some.find(b.index);
+      EXPECT_TRUE(place >= 0 || b.count < kLeast);
+      if (place < 0) continue;
+      const Block& found = some.all()[static_cast<std::size_t>(place)];
+      EXPECT_EQ(found.count, b.count);
+      EXPECT_NEAR(found.mass, b.mass, 1e-12 * b.mass);  // summed in another order
+      EXPECT_TRUE(same(found.bounds, b.bounds));
+    }
+    for (const BlockIndex index : next) EXPECT_EQ(some.find(index) >= 0, all.find(index) >= 0);
+    EXPECT_NEAR(sieve.mass(), mass, 1e-12 * mass);
+  }
 }
 
 TEST(Boxes, FollowTheDenseBodies) {
