@@ -1,6 +1,7 @@
 // The parts of the particle mesh, each against what it must be exactly.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
@@ -205,6 +206,7 @@ TEST(BlockSieve, CountsCrowdedBlocksLikeAllBlocks) {
   Cloud cloud = spheres(30000, {{0, 0, 0}}, 5e4);
   std::mt19937_64 random(5);
   add_ball(cloud, 70000, {0, 0, 0}, 1e7, random);
+  std::shuffle(cloud.position.begin(), cloud.position.end(), random);  // all masses are equal
   const ParticlesView particles{cloud.position, cloud.mass};
   constexpr double kWidth = 8e3;
   constexpr std::int64_t kLeast = 20;
@@ -246,6 +248,8 @@ TEST(Boxes, FollowTheDenseBodies) {
     EXPECT_LT(b.high.x - b.low.x, 2.01 * radius);
     EXPECT_GT(b.high.x - b.low.x, 1.9 * radius);
   }
+  // Their surfaces, where blocks are all but empty, belong to them.
+  for (const Vec3d& p : cloud.position) EXPECT_TRUE(boxes[0].contains(p) || boxes[1].contains(p));
   // Close by, one mesh over both is cheaper than two and the tree between them.
   cloud = spheres(4000, {{0, 0, 0}, {1.5e5, 0, 0}}, radius);
   EXPECT_EQ(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).size(), 1U);
@@ -255,6 +259,28 @@ TEST(Boxes, FollowTheDenseBodies) {
   cloud = spheres(500, {{0, 0, 0}}, 0.5 * radius);
   EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).empty());
   EXPECT_TRUE(choose_boxes({}, spacing, 1.3 * spacing, self, 1).empty());
+}
+
+// Filled to just about what makes a block dense, with most of each on one rank: the others must count what it names.
+TEST(Boxes, AreTheSameHoweverTheParticlesAreDealtOut) {
+  const mpi::Comm comm;
+  const double spacing = 5e4 * std::cbrt(4.0 / 3.0 * kPi / 20000.0);
+  const Cloud cloud = spheres(20000, {{0, 0, 0}}, 5e4);
+  Cloud mine;
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    const int others = comm.size() - 1;
+    const int rank = i % 5 < 4 || others == 0 ? 0 : 1 + static_cast<int>(i / 5) % others;
+    if (rank != comm.rank()) continue;
+    mine.position.push_back(cloud.position[i]);
+    mine.mass.push_back(cloud.mass[i]);
+  }
+  for (const double fill : {0.30, 0.36, 0.42, 0.48}) {
+    const double wide = spacing * std::cbrt(fill);
+    const auto alone = choose_boxes({cloud.position, cloud.mass}, wide, 1.3 * wide, mpi::Comm(MPI_COMM_SELF), 1);
+    const auto shared = choose_boxes({mine.position, mine.mass}, wide, 1.3 * wide, comm, 1);
+    ASSERT_EQ(shared.size(), alone.size()) << "fill " << fill;
+    for (std::size_t k = 0; k < alone.size(); ++k) EXPECT_TRUE(same(shared[k], alone[k])) << "fill " << fill;
+  }
 }
 
 TEST(Boxes, SpacingOfTheDenseParticles) {
