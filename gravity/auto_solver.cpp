@@ -12,8 +12,8 @@ void AutoSolver<Real>::evaluate(ParticlesView particles, std::span<Vec3d> accele
   Matter matter{.particles = comm_.sum(static_cast<std::uint64_t>(particles.position.size()))};
   if (!prefers_direct_sum(matter.particles, parameters_.error)) {
     choosing.time(Phase::kBoxes, [&] {
-      layout = lay_boxes(particles, parameters_.mesh, comm_);
-      matter = matter_of(layout, comm_);
+      layout = lay_boxes(particles, parameters_.mesh, comm_, threads_);
+      matter = matter_of(layout);
     });
     parameters_.mesh.particle_spacing = layout.spacing;
   }

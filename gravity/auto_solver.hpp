@@ -1,6 +1,8 @@
 // Takes, at each evaluation, the cheapest method that is accurate enough.
 #pragma once
 
+#include <algorithm>
+
 #include "gravity/direct_sum.hpp"
 #include "gravity/mesh/tree_pm.hpp"
 #include "gravity/tree/tree_solver.hpp"
@@ -15,6 +17,7 @@ class AutoSolver final : public Solver {
   AutoSolver(const Parameters& parameters, const mpi::Comm& comm, int threads)
       : parameters_(parameters),
         comm_(comm),
+        threads_(std::max(threads, 1)),
         direct_(parameters, comm, threads),
         tree_(parameters, comm, threads),
         mesh_(parameters, comm, threads) {}
@@ -26,6 +29,7 @@ class AutoSolver final : public Solver {
  private:
   Parameters parameters_;
   mpi::Comm comm_;
+  int threads_;
   DirectSum direct_;
   TreeSolver tree_;
   TreePm<Real> mesh_;

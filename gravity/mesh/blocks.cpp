@@ -1,29 +1,10 @@
 #include "gravity/mesh/blocks.hpp"
 
 #include <algorithm>
-#include <cmath>
+#include <iterator>
 #include <map>
 
 namespace breccia::gravity {
-namespace {
-
-std::uint64_t hash(BlockIndex index) {
-  const auto part = [](std::int32_t i) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i)); };
-  std::uint64_t h = part(index.x) * 0x9e3779b97f4a7c15ULL;
-  h = (h ^ (h >> 32) ^ part(index.y)) * 0xbf58476d1ce4e5b9ULL;
-  h = (h ^ (h >> 29) ^ part(index.z)) * 0x94d049bb133111ebULL;
-  return h ^ (h >> 31);
-}
-
-bool equal(BlockIndex a, BlockIndex b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
-
-std::int32_t block_coordinate(double x) { return static_cast<std::int32_t>(std::clamp(std::floor(x), -2e9, 2e9)); }
-
-BlockIndex block_of(Vec3d p, double per_width) {
-  return {block_coordinate(per_width * p.x), block_coordinate(per_width * p.y), block_coordinate(per_width * p.z)};
-}
-
-}  // namespace
 
 void Block::add(std::int64_t n, double m, const Box& b) {
   if (count == 0) bounds = b;
@@ -36,21 +17,20 @@ void Block::add(std::int64_t n, double m, const Box& b) {
 
 std::size_t Blocks::slot_of(BlockIndex index) const {
   const std::size_t mask = slots_.size() - 1;
-  std::size_t slot = hash(index) & mask;
-  while (slots_[slot] >= 0 && !equal(all_[static_cast<std::size_t>(slots_[slot])].index, index))
-    slot = (slot + 1) & mask;
+  std::size_t slot = hash_of(index) & mask;
+  while (slots_[slot] >= 0 && !(all_[static_cast<std::size_t>(slots_[slot])].index == index)) slot = (slot + 1) & mask;
   return slot;
 }
 
-void Blocks::prefetch(BlockIndex index) const { __builtin_prefetch(&slots_[hash(index) & (slots_.size() - 1)]); }
+void Blocks::prefetch(BlockIndex index) const { __builtin_prefetch(&slots_[hash_of(index) & (slots_.size() - 1)]); }
 
-Block& Blocks::at(BlockIndex index) {
+std::int64_t Blocks::place_of(BlockIndex index) {
   const std::size_t slot = slot_of(index);
-  if (slots_[slot] >= 0) return all_[static_cast<std::size_t>(slots_[slot])];
+  if (slots_[slot] >= 0) return slots_[slot];
   slots_[slot] = static_cast<std::int32_t>(all_.size());
   all_.push_back({index});
   if (2 * all_.size() > slots_.size()) grow();
-  return all_.back();
+  return std::ssize(all_) - 1;
 }
 
 void Blocks::grow() {
@@ -78,7 +58,7 @@ Blocks count_in_blocks(ParticlesView particles, double width) {
     const BlockIndex index = soon[i % kAhead];
     look_ahead(i + kAhead);
     // Particles mostly come in the order of space.
-    if (here == nullptr || !equal(index, last)) here = &blocks.at(last = index);
+    if (here == nullptr || !(index == last)) here = &blocks.at(last = index);
     here->add(1, particles.mass[i], {p, p});
   }
   return blocks;
@@ -94,7 +74,7 @@ std::vector<Occupancy> occupancy(ParticlesView particles, double width, const mp
   const auto ranks = static_cast<std::size_t>(comm.size());
   std::vector<std::vector<Share>> to(ranks);
   const Blocks own = count_in_blocks(particles, width);
-  for (const Block& b : own.all()) to[hash(b.index) % ranks].push_back({b.index, 0, b.count});
+  for (const Block& b : own.all()) to[hash_of(b.index) % ranks].push_back({b.index, 0, b.count});
   Blocks mine;
   for (const std::vector<Share>& from : comm.alltoall(to)) {
     for (const Share& s : from) mine.at(s.index).count += s.count;

@@ -1,6 +1,7 @@
 // The particles counted in cubic blocks of space, of which only the occupied ones exist.
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -11,7 +12,27 @@ namespace breccia::gravity {
 
 struct BlockIndex {
   std::int32_t x, y, z;
+
+  friend bool operator==(BlockIndex a, BlockIndex b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 };
+
+inline std::uint64_t hash_of(BlockIndex index) {
+  const auto part = [](std::int32_t i) { return static_cast<std::uint64_t>(static_cast<std::uint32_t>(i)); };
+  std::uint64_t h = part(index.x) * 0x9e3779b97f4a7c15ULL;
+  h = (h ^ (h >> 32) ^ part(index.y)) * 0xbf58476d1ce4e5b9ULL;
+  h = (h ^ (h >> 29) ^ part(index.z)) * 0x94d049bb133111ebULL;
+  return h ^ (h >> 31);
+}
+
+/// Of position p; blocks have 1/per_width [m]. Beyond 2e9 blocks from the origin all are the last one.
+inline BlockIndex block_of(Vec3d p, double per_width) {
+  const auto coordinate = [per_width](double x) {
+    const double scaled = std::clamp(per_width * x, -2e9, 2e9);
+    const auto towards_zero = static_cast<std::int32_t>(scaled);
+    return towards_zero - (scaled < towards_zero ? 1 : 0);
+  };
+  return {coordinate(p.x), coordinate(p.y), coordinate(p.z)};
+}
 
 /// The particles in one block.
 struct Block {
@@ -29,7 +50,9 @@ class Blocks {
   Blocks() { slots_.assign(64, -1); }
 
   /// The block, made if it is not there yet.
-  Block& at(BlockIndex index);
+  Block& at(BlockIndex index) { return all_[static_cast<std::size_t>(place_of(index))]; }
+  /// Its place in all(), which it keeps.
+  std::int64_t place_of(BlockIndex index);
   /// Brings the memory that at() or find() of this block will ask for first.
   void prefetch(BlockIndex index) const;
   /// Place of a block in all(), or -1.

@@ -11,11 +11,7 @@ void BoxField<Real>::add_to(ParticlesView particles, std::span<const std::uint8_
                             const BoxSettings& settings, const FieldView& field, Stats& stats) {
   const MeshGeometry geometry(settings.box, settings.cell);
   Phases& phases = stats.phases;
-  phases.time(Phase::kTransform, [&] {
-    prepare_mesh(geometry, {.scale = settings.split,
-                            .cutoff = settings.split * settings.cutoff,
-                            .softening = settings.softening / settings.cell});
-  });
+  phases.time(Phase::kTransform, [&] { prepare_mesh(geometry, settings.split); });
   phases.time(Phase::kSort, [&] {
     select(particles, set, number, geometry, settings.mass_unit);
     clusters_.build(position_, mass_, settings.spacing / settings.cell, threads_);
@@ -56,7 +52,7 @@ void BoxField<Real>::write(const BoxSettings& settings, const FieldView& field) 
   const double potential_unit = kGravitationalConstant * settings.mass_unit / settings.cell;
   const double unit = potential_unit / settings.cell;
   // A softened particle also got its own potential, of both parts together that of Plummer's law at distance 0.
-  const double self = law_.counts_self ? settings.cell / settings.softening : 0.0;
+  const double self = law_.counts_self ? 1.0 / settings.split.softening : 0.0;
   const std::vector<std::int64_t>& slots = clusters_.slots();
   const auto n = static_cast<std::int64_t>(index_.size());
 #pragma omp parallel for num_threads(threads_) schedule(static)

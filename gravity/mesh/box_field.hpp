@@ -12,12 +12,10 @@ namespace breccia::gravity {
 
 struct BoxSettings {
   Box box;
-  double cell;       ///< of the mesh [m]
-  double spacing;    ///< mean distance of the particles where they are dense [m]
-  double split;      ///< rs in cells
-  double cutoff;     ///< in rs
-  double softening;  ///< [m]
-  double mass_unit;  ///< [kg]
+  double cell;          ///< of the mesh [m]
+  double spacing;       ///< mean distance of the particles where they are dense [m]
+  GaussianSplit split;  ///< [cells]
+  double mass_unit;     ///< [kg]
 };
 
 template <class Real>

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <limits>
 
-#include "gravity/mesh/blocks.hpp"
+#include "gravity/mesh/block_sieve.hpp"
 
 namespace breccia::gravity {
 
@@ -40,26 +40,41 @@ struct Region {
 };
 
 template <class F>
-void for_each_neighbour(const Blocks& blocks, BlockIndex b, const F& f) {
+void for_each_around(BlockIndex b, const F& f) {
   for (int dx = -1; dx <= 1; ++dx) {
     for (int dy = -1; dy <= 1; ++dy) {
-      for (int dz = -1; dz <= 1; ++dz) {
-        const std::int64_t n = blocks.find({b.x + dx, b.y + dy, b.z + dz});
-        if (n >= 0) f(static_cast<std::size_t>(n));
-      }
+      for (int dz = -1; dz <= 1; ++dz) f(BlockIndex{b.x + dx, b.y + dy, b.z + dz});
     }
   }
 }
 
-// Blocks that hold `least` particles of all ranks, the same on all of them but for the order.
-Blocks dense_blocks(const Blocks& own, std::int64_t least, const mpi::Comm& comm) {
+template <class F>
+void for_each_neighbour(const Blocks& blocks, BlockIndex b, const F& f) {
+  for_each_around(b, [&](BlockIndex index) {
+    const std::int64_t n = blocks.find(index);
+    if (n >= 0) f(static_cast<std::size_t>(n));
+  });
+}
+
+std::vector<BlockIndex> with_neighbours(const Blocks& blocks) {
+  std::vector<BlockIndex> all;
+  for (const Block& b : blocks.all()) for_each_around(b.index, [&](BlockIndex index) { all.push_back(index); });
+  return all;
+}
+
+// Blocks that hold `least` particles of all ranks, the same on all of them but for the order. Counts them, those of
+// this rank, into `own`.
+Blocks dense_blocks(const BlockSieve& sieve, Blocks& own, std::int64_t least, const mpi::Comm& comm) {
   const std::int64_t share = comm.size() == 1 ? least : std::max(kLeastNamed, (least + comm.size() - 1) / comm.size());
+  sieve.count_crowded(share, own);
   std::vector<BlockIndex> named;
   for (const Block& b : own.all()) {
     if (b.count >= share) named.push_back(b.index);
   }
+  const std::vector<BlockIndex> named_by_all = comm.allgather_arrays(std::span<const BlockIndex>(named));
+  sieve.count(named_by_all, own);
   Blocks all;
-  for (const BlockIndex& index : comm.allgather_arrays(std::span<const BlockIndex>(named))) all.at(index);
+  for (const BlockIndex& index : named_by_all) all.at(index);
   std::vector<std::int64_t> counts;
   for (const Block& b : all.all()) {
     const std::int64_t here = own.find(b.index);
@@ -176,7 +191,8 @@ std::int64_t median_dense_count(std::vector<Occupancy> blocks) {
 
 }  // namespace
 
-std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double cell, const mpi::Comm& comm) {
+std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double cell, const mpi::Comm& comm,
+                              int threads) {
   std::int64_t full = kFullCount;
   double width = kBlockWidth * spacing;
   const std::uint64_t all = comm.sum(static_cast<std::uint64_t>(particles.position.size()));
@@ -184,12 +200,12 @@ std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double ce
     full *= 8;
     width *= 2.0;
   }
-  const Blocks own = count_in_blocks(particles, width);
-  double total = 0.0;
-  for (const Block& b : own.all()) total += b.mass;
-  total = comm.sum(total);
-
-  const Blocks dense = dense_blocks(own, static_cast<std::int64_t>(kDense * static_cast<double>(full)), comm);
+  const BlockSieve sieve(particles, width, threads);
+  const double total = comm.sum(sieve.mass());
+  const auto least = static_cast<std::int64_t>(kDense * static_cast<double>(full));
+  Blocks own;
+  const Blocks dense = dense_blocks(sieve, own, least, comm);
+  sieve.count(with_neighbours(dense), own);
   std::vector<Region> regions = dense_regions(own, dense, comm);
   std::erase_if(regions, [&](const Region& r) {
     return r.count < kLeastBoxParticles || r.mass < kLeastBoxMass * total ||

@@ -18,7 +18,7 @@ inline constexpr double kLeastBoxMass = 0.1;  ///< fraction of all mass
 /// least three eighths at mean distance `spacing` [m] that hold a tenth of the mass and 1000 particles. Boxes that
 /// overlap become one, and so do boxes that share a mesh of `cell` [m] at less than twice the cost of two. The same on
 /// all ranks, and but for rounding the same for any distribution of the particles. Collective.
-std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double cell, const mpi::Comm& comm);
+std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double cell, const mpi::Comm& comm, int threads);
 
 /// Nodes of the mesh around `box`, not doubled.
 double mesh_nodes(const Box& box, double cell);

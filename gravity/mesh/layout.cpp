@@ -4,25 +4,30 @@
 
 namespace breccia::gravity {
 
-Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi::Comm& comm) {
+Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi::Comm& comm, int threads) {
   Layout layout;
   layout.spacing = mesh.particle_spacing > 0.0 ? mesh.particle_spacing : dense_spacing(particles, comm);
   layout.cell = mesh.cell > 0.0 ? mesh.cell : kCellsPerSpacing * layout.spacing;
-  layout.boxes = choose_boxes(particles, layout.spacing, layout.cell, comm);
+  layout.boxes = choose_boxes(particles, layout.spacing, layout.cell, comm, threads);
   layout.set.assign(particles.position.size(), 0);
+#pragma omp parallel for num_threads(threads) schedule(static)
   for (std::size_t i = 0; i < layout.set.size(); ++i) {
     for (std::size_t k = 0; k < layout.boxes.size() && layout.set[i] == 0; ++k) {
       if (layout.boxes[k].contains(particles.position[i])) layout.set[i] = static_cast<std::uint8_t>(k + 1);
     }
   }
+  for (std::size_t k = 0; k <= layout.boxes.size(); ++k) {
+    const auto here = std::count(layout.set.begin(), layout.set.end(), static_cast<std::uint8_t>(k));
+    layout.count.push_back(static_cast<std::uint64_t>(here));
+  }
+  comm.sum(std::span<std::uint64_t>(layout.count));
   return layout;
 }
 
-Matter matter_of(const Layout& layout, const mpi::Comm& comm) {
+Matter matter_of(const Layout& layout) {
   Matter matter;
-  const auto outside = std::count(layout.set.begin(), layout.set.end(), std::uint8_t{0});
-  matter.particles = comm.sum(static_cast<std::uint64_t>(layout.set.size()));
-  matter.in_boxes = matter.particles - comm.sum(static_cast<std::uint64_t>(outside));
+  for (const std::uint64_t n : layout.count) matter.particles += n;
+  matter.in_boxes = matter.particles - layout.count[0];
   for (const Box& box : layout.boxes) matter.mesh_nodes += mesh_nodes(box, layout.cell);
   matter.boxes = static_cast<int>(layout.boxes.size());
   return matter;

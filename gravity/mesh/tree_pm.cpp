@@ -1,6 +1,7 @@
 #include "gravity/mesh/tree_pm.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <string>
 
@@ -18,15 +19,31 @@ constexpr double kLeastSplit = 0.6;
 double split_for(double error) { return std::clamp(0.8 * std::pow(4.3e-4 / error, 0.21), 0.7, 1.7); }
 double cutoff_for(double split) { return std::clamp(4.5 + 2.4 * (split - 0.8), 4.2, 6.5); }
 
-Parameters completed(Parameters p) {
-  MeshParameters& mesh = p.mesh;
-  if (mesh.split == 0.0) mesh.split = split_for(p.error);
-  if (mesh.cutoff == 0.0) mesh.cutoff = cutoff_for(mesh.split);
-  if (!(mesh.split >= kLeastSplit)) {
-    throw UsageError("gravity.split = " + std::to_string(mesh.split) + ": must be at least 0.6 mesh cells");
+// What the split must leave of Parameters::error in a box of so many particles. Errors are those of near neighbours,
+// whose pull compares to the body's as spacing to radius: the same split leaves a third more with a third of the
+// particles. More than those of state (a) leave less, which is kept (gravity.md 7). In steps, as kernels are made anew
+// for each split.
+double share_of_error(std::uint64_t particles) {
+  constexpr std::uint64_t kUsual = 65'536;
+  return particles >= kUsual ? 1.0 : std::cbrt(static_cast<double>(std::bit_floor(particles)) / kUsual);
+}
+
+// Of a box of so many particles, [cells].
+GaussianSplit split_of_box(const Parameters& p, double cell, std::uint64_t particles) {
+  GaussianSplit split{.softening = p.softening / cell};
+  split.scale = p.mesh.split > 0.0 ? p.mesh.split : split_for(p.error * share_of_error(particles));
+  split.cutoff = split.scale * (p.mesh.cutoff > 0.0 ? p.mesh.cutoff : cutoff_for(split.scale));
+  return split;
+}
+
+const Parameters& checked(const Parameters& p) {
+  if (p.mesh.split != 0.0 && !(p.mesh.split >= kLeastSplit)) {
+    throw UsageError("gravity.split = " + std::to_string(p.mesh.split) + ": must be at least 0.6 mesh cells");
   }
-  if (!(mesh.cell >= 0.0)) throw UsageError("gravity.mesh = " + std::to_string(mesh.cell) + " m: must not be negative");
-  fit_short_range<double>({mesh.split, mesh.split * mesh.cutoff, 0.0});
+  if (!(p.mesh.cell >= 0.0)) {
+    throw UsageError("gravity.mesh = " + std::to_string(p.mesh.cell) + " m: must not be negative");
+  }
+  fit_short_range<double>(split_of_box(p, 1.0, kLeastBoxParticles));
   return p;
 }
 
@@ -34,7 +51,7 @@ Parameters completed(Parameters p) {
 
 template <class Real>
 TreePm<Real>::TreePm(const Parameters& parameters, const mpi::Comm& comm, int threads)
-    : parameters_(completed(parameters)),
+    : parameters_(checked(parameters)),
       comm_(comm),
       threads_(std::max(threads, 1)),
       unsplit_(parameters, comm, threads_) {
@@ -46,7 +63,7 @@ void TreePm<Real>::evaluate(ParticlesView particles, std::span<Vec3d> accelerati
   check_sizes(particles, acceleration, potential);
   Phases laying;
   Layout layout;
-  laying.time(Phase::kBoxes, [&] { layout = lay_boxes(particles, parameters_.mesh, comm_); });
+  laying.time(Phase::kBoxes, [&] { layout = lay_boxes(particles, parameters_.mesh, comm_, threads_); });
   parameters_.mesh.particle_spacing = layout.spacing;
   evaluate_in(layout, particles, acceleration, potential);
   stats_.phases[Phase::kBoxes] = laying[Phase::kBoxes];
@@ -69,13 +86,11 @@ void TreePm<Real>::evaluate_in(const Layout& layout, ParticlesView particles, st
     const BoxSettings settings{.box = layout.boxes[k],
                                .cell = layout.cell,
                                .spacing = layout.spacing,
-                               .split = parameters_.mesh.split,
-                               .cutoff = parameters_.mesh.cutoff,
-                               .softening = parameters_.softening,
+                               .split = split_of_box(parameters_, layout.cell, layout.count[k + 1]),
                                .mass_unit = mass_unit};
     fields_[k].add_to(particles, layout.set, static_cast<std::uint8_t>(k + 1), settings, field, stats_);
   }
-  const bool all_in_one = stats_.boxes == 1 && !comm_.any(std::ranges::count(layout.set, std::uint8_t{0}) > 0);
+  const bool all_in_one = stats_.boxes == 1 && layout.count[0] == 0;
   if (!all_in_one) unsplit_.add_to(particles, layout.set, stats_.boxes + 1, mass_unit, field, stats_);
   remove_net_force(particles, acceleration, comm_, stats_);
   stats_.bytes_sent += stats_.phases.bytes_sent;

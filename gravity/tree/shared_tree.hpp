@@ -71,18 +71,20 @@ class SharedTree {
   };
   class Census;
 
+  // shared_top.cpp
   void grow_top();
   [[nodiscard]] Split split_of_top(std::size_t cell) const;
   void split_top(std::span<const std::size_t> frontier);
   void list_leaves();
+  void enclose_top();
+  // shared_groups.cpp
   void gather_groups();
   void sort_by_leaves(std::vector<std::vector<Traveller>>& arrived);
+  [[nodiscard]] FieldSums bring_home(const FieldSums& sums, std::vector<std::int64_t>& index);
+  // shared_tree.cpp
   void grow_below();
   void share_moments();
-  void enclose_top();
   [[nodiscard]] double reach_of(const Cell& leaf) const;
-
-  [[nodiscard]] FieldSums bring_home(const FieldSums& sums, std::vector<std::int64_t>& index);
 
   mpi::Comm comm_;
   int threads_;

@@ -64,6 +64,9 @@ void UnsplitField::grow_trees(ParticlesView particles, double mass_unit, bool wi
     s.tree->build(root_, sets_.size() == 1 ? particles : ParticlesView{s.position, s.mass}, mass_unit);
     s.sums.reset(s.tree->tree().particles.size(), with_potential);
   }
+  std::int64_t all = 0;
+  for (const Set& s : sets_) all += s.tree->tree().all_particles;
+  opening_ = opening_for(parameters_, static_cast<double>(all));
 }
 
 void UnsplitField::weigh_cells() {
@@ -85,7 +88,7 @@ void UnsplitField::import_sources(Stats& stats) {
     for (std::size_t target = 0; target < sets_.size(); ++target) {
       if (interact(target, source)) targets.push_back(sets_[target].tree.get());
     }
-    const EssentialCount count = import_essential(*sets_[source].tree, targets, opening_for(parameters_), comm_);
+    const EssentialCount count = import_essential(*sets_[source].tree, targets, opening_, comm_);
     stats.bytes_sent += count.bytes_sent;
     stats.cells_imported += count.cells;
     stats.particles_imported += count.particles;
@@ -94,7 +97,7 @@ void UnsplitField::import_sources(Stats& stats) {
 
 void UnsplitField::walk_all(std::size_t target, Stats& stats) {
   Set& s = sets_[target];
-  const WalkSettings settings{opening_for(parameters_), parameters_.softening / root_.unit, threads_};
+  const WalkSettings settings{opening_, parameters_.softening / root_.unit, threads_};
   for (std::size_t source = 0; source < sets_.size(); ++source) {
     if (!interact(target, source)) continue;
     const Tree& from = sets_[source].tree->tree();

@@ -46,6 +46,7 @@ class UnsplitField {
   mpi::Comm comm_;
   int threads_;
   Root root_;
+  double opening_ = 0.0;
   std::vector<Set> sets_;
 };
 

@@ -86,7 +86,7 @@ void CudaGravity<Real>::sum_by_tree(const Extremes& extremes, double mass_unit) 
                      [&] { tree_.build(all, root, mass_unit, softening, bodies_.first(), bodies_.own()); });
   stats_.phases.time(Phase::kTree, [&] {
     walk_.evaluate(tree_,
-                   {.tolerance = gravity::opening_for(parameters_),
+                   {.tolerance = gravity::opening_for(parameters_, static_cast<double>(all.count)),
                     .softening = softening,
                     .first = bodies_.first(),
                     .own = bodies_.own(),

@@ -1,10 +1,12 @@
 // The parts of the particle mesh, each against what it must be exactly.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <random>
 
 #include "breccia/error.hpp"
+#include "gravity/mesh/block_sieve.hpp"
 #include "gravity/mesh/box_mesh.hpp"
 #include "gravity/mesh/boxes.hpp"
 #include "gravity/mesh/clusters.hpp"
@@ -194,26 +196,91 @@ Cloud spheres(std::size_t each, std::initializer_list<Vec3d> centres, double rad
   return cloud;
 }
 
+bool same(const Box& a, const Box& b) {
+  return a.low.x == b.low.x && a.low.y == b.low.y && a.low.z == b.low.z && a.high.x == b.high.x &&
+         a.high.y == b.high.y && a.high.z == b.high.z;
+}
+
+// A body that is wide in blocks among debris in more blocks than the sieve has counters, dealt into several pieces.
+TEST(BlockSieve, CountsCrowdedBlocksLikeAllBlocks) {
+  Cloud cloud = spheres(30000, {{0, 0, 0}}, 5e4);
+  std::mt19937_64 random(5);
+  add_ball(cloud, 70000, {0, 0, 0}, 1e7, random);
+  std::shuffle(cloud.position.begin(), cloud.position.end(), random);  // all masses are equal
+  const ParticlesView particles{cloud.position, cloud.mass};
+  constexpr double kWidth = 8e3;
+  constexpr std::int64_t kLeast = 20;
+  const Blocks all = count_in_blocks(particles, kWidth);
+  ASSERT_GT(all.all().size(), std::size_t{1} << 16);
+  for (const int threads : {1, 3}) {
+    const BlockSieve sieve(particles, kWidth, threads);
+    Blocks some;
+    sieve.count_crowded(kLeast, some);
+    EXPECT_LT(some.all().size(), all.all().size() / 10);
+    // Those next to the crowded ones, too, without counting again what is known.
+    std::vector<BlockIndex> next;
+    for (const Block& b : some.all()) next.push_back({b.index.x, b.index.y, b.index.z + 1});
+    sieve.count(next, some);
+    double mass = 0.0;
+    for (const Block& b : all.all()) {
+      mass += b.mass;
+      const std::int64_t place = some.find(b.index);
+      EXPECT_TRUE(place >= 0 || b.count < kLeast);
+      if (place < 0) continue;
+      const Block& found = some.all()[static_cast<std::size_t>(place)];
+      EXPECT_EQ(found.count, b.count);
+      EXPECT_NEAR(found.mass, b.mass, 1e-12 * b.mass);  // summed in another order
+      EXPECT_TRUE(same(found.bounds, b.bounds));
+    }
+    for (const BlockIndex index : next) EXPECT_EQ(some.find(index) >= 0, all.find(index) >= 0);
+    EXPECT_NEAR(sieve.mass(), mass, 1e-12 * mass);
+  }
+}
+
 TEST(Boxes, FollowTheDenseBodies) {
   const mpi::Comm self(MPI_COMM_SELF);
   const double radius = 5e4;
   const double spacing = radius * std::cbrt(4.0 / 3.0 * kPi / 4000.0);
   Cloud cloud = spheres(4000, {{0, 0, 0}, {2e6, 1e6, 0}}, radius);
-  std::vector<Box> boxes = choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self);
+  std::vector<Box> boxes = choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1);
   ASSERT_EQ(boxes.size(), 2U);
   for (const Box& b : boxes) {
     EXPECT_LT(b.high.x - b.low.x, 2.01 * radius);
     EXPECT_GT(b.high.x - b.low.x, 1.9 * radius);
   }
+  // Their surfaces, where blocks are all but empty, belong to them.
+  for (const Vec3d& p : cloud.position) EXPECT_TRUE(boxes[0].contains(p) || boxes[1].contains(p));
   // Close by, one mesh over both is cheaper than two and the tree between them.
   cloud = spheres(4000, {{0, 0, 0}, {1.5e5, 0, 0}}, radius);
-  EXPECT_EQ(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self).size(), 1U);
+  EXPECT_EQ(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).size(), 1U);
   // Debris is no body, however much of it there is; nor is a body too light or without enough particles.
   cloud = spheres(8000, {{0, 0, 0}}, 4e7);
-  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self).empty());
+  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).empty());
   cloud = spheres(500, {{0, 0, 0}}, 0.5 * radius);
-  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self).empty());
-  EXPECT_TRUE(choose_boxes({}, spacing, 1.3 * spacing, self).empty());
+  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).empty());
+  EXPECT_TRUE(choose_boxes({}, spacing, 1.3 * spacing, self, 1).empty());
+}
+
+// Filled to just about what makes a block dense, with most of each on one rank: the others must count what it names.
+TEST(Boxes, AreTheSameHoweverTheParticlesAreDealtOut) {
+  const mpi::Comm comm;
+  const double spacing = 5e4 * std::cbrt(4.0 / 3.0 * kPi / 20000.0);
+  const Cloud cloud = spheres(20000, {{0, 0, 0}}, 5e4);
+  Cloud mine;
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    const int others = comm.size() - 1;
+    const int rank = i % 5 < 4 || others == 0 ? 0 : 1 + static_cast<int>(i / 5) % others;
+    if (rank != comm.rank()) continue;
+    mine.position.push_back(cloud.position[i]);
+    mine.mass.push_back(cloud.mass[i]);
+  }
+  for (const double fill : {0.30, 0.36, 0.42, 0.48}) {
+    const double wide = spacing * std::cbrt(fill);
+    const auto alone = choose_boxes({cloud.position, cloud.mass}, wide, 1.3 * wide, mpi::Comm(MPI_COMM_SELF), 1);
+    const auto shared = choose_boxes({mine.position, mine.mass}, wide, 1.3 * wide, comm, 1);
+    ASSERT_EQ(shared.size(), alone.size()) << "fill " << fill;
+    for (std::size_t k = 0; k < alone.size(); ++k) EXPECT_TRUE(same(shared[k], alone[k])) << "fill " << fill;
+  }
 }
 
 TEST(Boxes, SpacingOfTheDenseParticles) {

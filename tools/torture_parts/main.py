@@ -6,7 +6,7 @@ import subprocess
 import time
 
 import torture_random
-from torture_parts import fuzz, kill, mutate, quiet, sanitizers
+from torture_parts import fuzz, kill, methods, mutate, quiet, sanitizers
 
 EPILOG = """\
 Without a part all of them run, one after the other. The last line is the summary; the exit code is 0 only if nothing was
@@ -28,6 +28,7 @@ def parse(arguments=None):
         part.add_argument("--quick", action="store_true", default=argparse.SUPPRESS, help="a small share")
         module.add_options(part)
     for name, text in (
+        ("methods", "the coarse flagship collision by direct sums and by the particle mesh: the same remnant"),
         ("quiet", "bodies that rest or turn for 8e5 steps and 1e5 s; what creeps"),
         ("sanitize", "all tests under the address and undefined-behaviour sanitizers"),
         ("threads", "the threaded engine under the thread sanitizer (clang-16)"),
@@ -56,6 +57,7 @@ def main(root):
         "mutate": mutate.run,
         "fuzz": fuzz.run,
         "random": torture_random.run,
+        "methods": methods.run,
         "quiet": quiet.run,
         "sanitize": sanitizers.run_address,
         "threads": sanitizers.run_threads,
