@@ -4,8 +4,8 @@
 
 #include <array>
 #include <cstdint>
-#include <map>
 #include <span>
+#include <unordered_map>
 #include <vector>
 
 #include "breccia/particle_arrays.hpp"
@@ -55,6 +55,12 @@ class ReferenceStep {
 
  private:
   using Index = std::array<int, 3>;
+  struct Hash {
+    std::size_t operator()(const Index& n) const {
+      return static_cast<std::size_t>(n[0]) * 73856093U ^ static_cast<std::size_t>(n[1]) * 19349663U ^
+             static_cast<std::size_t>(n[2]) * 83492791U;
+    }
+  };
   struct Node {
     double mass = 0.0;
     Vec3d momentum{}, force{}, old_velocity{}, velocity{};
@@ -68,7 +74,7 @@ class ReferenceStep {
   material::Constants<double> constants_;
   std::vector<ReferenceParticle> particles_;
   EnergyTerms terms_;
-  std::map<Index, Node> grid_;
+  std::unordered_map<Index, Node, Hash> grid_;
 };
 
 }  // namespace breccia::test
