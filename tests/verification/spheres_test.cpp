@@ -67,8 +67,10 @@ TEST(Verification, ElasticSphereRings) {
     record("ringing sphere", "period [s]", cells, period, exact, "exact: lowest radial mode");
     errors.emplace_back(1.0 / cells, period / exact - 1.0);
   }
+  // Towards a wrong period the errors would fall too slowly or, on their way past the right one, too fast: a shear
+  // modulus 1.4 times as large gives 3.6.
+  EXPECT_NEAR(observed_order(errors), 1.7, 0.5);
   EXPECT_LT(std::abs(errors.back().second), 0.02);
-  EXPECT_LT(std::abs(errors.back().second), std::abs(errors.front().second));
 }
 
 // A free elastic sphere that turns stretches: <ln J> = (2/15) rho R^2 Omega^2/K, 3.03e-6 at 3e-4 1/s. Averaged between
