@@ -24,8 +24,8 @@ TIMEOUT = 120  # seconds; a run takes less than one
 MOMENTUM = {"mixed": 3e-6, "double": 1e-11}  # of sum m|v|: rounding of weights, physics of 1e2 steps and 1e2 particles
 AT_REST = {"mixed": 1e-8, "double": 1e-15}  # of total mass times sound speed: rounding of the stress's impulses
 # Of the largest kinetic + thermal + potential energy. What ASFLIP heats in half-empty cells beyond what motion loses
-# reaches ten percent in bodies of two cells (24 in rubble that flies apart and meets again); a step that is unstable
-# gains without bound. The potential itself is known to gravity.error, 3.5e-4 and mostly the same from row to row: 1e-4
+# (docs/verification.md) reaches ten percent in bodies of two cells, 24 in rubble that flies apart and meets again; a step
+# that is unstable gains without bound. The potential itself is known to gravity.error, 3.5e-4 and mostly the same from row to row: 1e-4
 # of it is the floor.
 ENERGY = 0.3
 

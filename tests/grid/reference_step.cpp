@@ -14,9 +14,17 @@ Vec3d times(const Mat3<double>& m, Vec3d r) {
   return {m.xx * r.x + m.xy * r.y + m.xz * r.z, m.yx * r.x + m.yy * r.y + m.yz * r.z,
           m.zx * r.x + m.zy * r.y + m.zz * r.z};
 }
+double power(const Sym3<double>& t, const Mat3<double>& c) {
+  return t.xx * c.xx + t.yy * c.yy + t.zz * c.zz + t.xy * (c.xy + c.yx) + t.xz * (c.xz + c.zx) + t.yz * (c.yz + c.zy);
+}
 Vec3d times(const Sym3<double>& m, Vec3d r) {
   return {m.xx * r.x + m.xy * r.y + m.xz * r.z, m.xy * r.x + m.yy * r.y + m.yz * r.z,
           m.xz * r.x + m.yz * r.y + m.zz * r.z};
+}
+
+void add_outer(Mat3<double>& c, Vec3d v, Vec3d r) {
+  c = {c.xx + v.x * r.x, c.xy + v.x * r.y, c.xz + v.x * r.z, c.yx + v.y * r.x, c.yy + v.y * r.y,
+       c.yz + v.y * r.z, c.zx + v.z * r.x, c.zy + v.z * r.y, c.zz + v.z * r.z};
 }
 
 // Calls visit(index, w, x_i - x_p) for the 27 nodes of a particle.
@@ -59,6 +67,8 @@ void ReferenceStep::step(double dt) {
   for (auto& [index, node] : grid_) {
     node.old_velocity = (1.0 / node.mass) * node.momentum;
     node.velocity = node.old_velocity + (dt / node.mass) * node.force;
+    terms_.affine -= dt / node.mass * dot(node.force, node.affine);
+    terms_.filter -= 0.5 * dt * dt / node.mass * dot(node.force, node.force);
   }
   g2p(dt);
 }
@@ -67,14 +77,16 @@ void ReferenceStep::p2g(double dt) {
   grid_.clear();
   for (ReferenceParticle& p : particles_) {
     material::Dissipation<double> lost{};
-    const Sym3<double> tau = material::update_stress(setup_.effects, constants_, p.state, p.c, 0.5 * dt, lost);
+    p.tau = material::update_stress(setup_.effects, constants_, p.state, p.c, 0.5 * dt, lost);
     const double volume = p.mass / setup_.material.eos.rho0;
     for_each_node(p.x, setup_.cell, [&](const Index& index, double w, Vec3d r) {
       if (w == 0.0) return;
       Node& node = grid_[index];
       node.mass += w * p.mass;
-      node.momentum += w * p.mass * (p.v + times(p.c, r));
-      node.force += w * (p.mass * setup_.gravity - (4.0 / (setup_.cell * setup_.cell) * volume) * times(tau, r));
+      const Vec3d affine = w * p.mass * times(p.c, r);
+      node.affine += affine;
+      node.momentum += w * p.mass * p.v + affine;
+      node.force += w * (p.mass * setup_.gravity - (4.0 / (setup_.cell * setup_.cell) * volume) * times(p.tau, r));
     });
   }
 }
@@ -83,18 +95,21 @@ void ReferenceStep::g2p(double dt) {
   const double d = 4.0 / (setup_.cell * setup_.cell);
   for (ReferenceParticle& p : particles_) {
     Vec3d updated{}, old{};
-    Mat3<double> c{};
+    Mat3<double> c{}, old_c{};
     for_each_node(p.x, setup_.cell, [&](const Index& index, double w, Vec3d r) {
       if (w == 0.0) return;
       const Node& node = grid_.at(index);
       updated += w * node.velocity;
       old += w * node.old_velocity;
-      const Vec3d v = w * d * node.velocity;
-      c = {c.xx + v.x * r.x, c.xy + v.x * r.y, c.xz + v.x * r.z, c.yx + v.y * r.x, c.yy + v.y * r.y,
-           c.yz + v.y * r.z, c.zx + v.z * r.x, c.zy + v.z * r.y, c.zz + v.z * r.z};
+      add_outer(c, w * d * node.velocity, r);
+      add_outer(old_c, w * d * node.old_velocity, r);
     });
-    const Vec3d slip = setup_.alpha * (p.v - old);
+    const Vec3d slip = setup_.alpha * (p.v - old), taken = updated - old;
+    const Vec3d twice_mean = p.v + updated + slip;
+    terms_.filter += 0.5 * p.mass * dot(taken, taken);
+    terms_.smoothing -= 0.5 * (1.0 - setup_.alpha) * p.mass * dot(p.v - old, twice_mean + taken);
     p.v = updated + slip;
+    terms_.gradient += 0.5 * dt * p.mass / setup_.material.eos.rho0 * (power(p.tau, p.c) - power(p.tau, old_c));
     p.x += dt * (updated + setup_.beta * slip);
     p.c = c;
     material::update_strain(setup_.effects, constants_, p.state, p.c, dt);

@@ -10,6 +10,9 @@ import time
 from torture_parts import runs
 
 
+OTHERS_END = 30  # seconds after a kill, at the latest
+
+
 def add_options(parser):
     parser.add_argument("--count", type=int, default=200, help="kills [200; 10 with --quick]")
     parser.add_argument("--ranks", type=int, default=2, help="ranks of the run [2]")
@@ -30,7 +33,8 @@ def is_writing(out):
 
 
 def disturb(runner, out, length, random_source):
-    """Starts or continues the run in `out` and kills it once. Returns what was done, or None if it ended before."""
+    """Starts or continues the run in `out` and kills it once. Returns what was wrong, or None, and the seconds that the
+    other ranks took to end."""
     process = runner.start(out, "--restart", "auto")
     during_writing = random_source.random() < 0.5
     everyone = random_source.random() < 0.5
@@ -43,14 +47,16 @@ def disturb(runner, out, length, random_source):
     ended = process.poll() is not None
     ranks = runs.ranks_of(process)
     kill_some(process, ranks, everyone, random_source)
+    killed = time.monotonic()
     try:
-        errors = process.communicate(timeout=40)[1]
+        errors = process.communicate(timeout=OTHERS_END)[1]
     except runs.subprocess.TimeoutExpired:
         runs.end(process)
-        return "the other ranks went on for 40 s after a kill"
+        return f"the other ranks went on for {OTHERS_END} s after a kill", OTHERS_END
+    took = time.monotonic() - killed
     if ended and process.returncode != 0:
-        return f"a restart failed with exit code {process.returncode}: {errors.strip().splitlines()[-1:]}"
-    return None
+        return f"a restart failed with exit code {process.returncode}: {errors.strip().splitlines()[-1:]}", took
+    return None, took
 
 
 def run(root, options):
@@ -70,6 +76,7 @@ def run(root, options):
     whole = runs.results(folder / "whole")
 
     findings = kills = rounds = 0
+    longest = 0.0
     while kills < count:
         out = folder / f"round{rounds}"
         rounds += 1
@@ -77,7 +84,9 @@ def run(root, options):
         # Several kills on the way of one run: a checkpoint of a continued run is one like any other.
         for _ in range(min(random_source.randint(1, 4), count - kills)):
             kills += 1
-            if problem := disturb(runner, out, length, random_source):
+            problem, took = disturb(runner, out, length, random_source)
+            longest = max(longest, took)
+            if problem:
                 trouble.append(problem)
         code, errors = runner.finish(out, "--restart", "auto")
         if code != 0:
@@ -89,4 +98,4 @@ def run(root, options):
             print(f"{out}: {'; '.join(trouble)}", flush=True)
         else:
             shutil.rmtree(out)
-    return f"{kills} kills in {rounds} runs on {ranks} ranks (one takes {length:.1f} s)", findings
+    return f"{kills} kills in {rounds} runs on {ranks} ranks (one takes {length:.1f} s), all ended within {longest:.1f} s", findings
