@@ -9,12 +9,8 @@ Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi:
   layout.spacing = mesh.particle_spacing > 0.0 ? mesh.particle_spacing : dense_spacing(particles, comm);
   layout.cell = mesh.cell > 0.0 ? mesh.cell : kCellsPerSpacing * layout.spacing;
   layout.boxes = choose_boxes(particles, layout.spacing, layout.cell, comm);
-  layout.set.assign(particles.position.size(), 0);
-  for (std::size_t i = 0; i < layout.set.size(); ++i) {
-    for (std::size_t k = 0; k < layout.boxes.size() && layout.set[i] == 0; ++k) {
-      if (layout.boxes[k].contains(particles.position[i])) layout.set[i] = static_cast<std::uint8_t>(k + 1);
-    }
-  }
+  layout.set.reserve(particles.position.size());
+  for (const Vec3d p : particles.position) layout.set.push_back(set_of(p, layout.boxes.data(), layout.boxes.size()));
   return layout;
 }
 
