@@ -6,26 +6,14 @@
 #include "cuda/check.hpp"
 #include "cuda/gravity_pairs.cuh"
 #include "cuda/launchers.hpp"
-#include "cuda/mesh_kernels.hpp"
+#include "cuda/near_list.cuh"
 
 namespace breccia::cuda {
 namespace {
 
-constexpr unsigned kThreads = 128;
+constexpr unsigned kThreads = kNearThreads;
 constexpr unsigned kWarp = kClusterBodies;
 constexpr unsigned kAllLanes = 0xffffffffU;
-constexpr unsigned kListed = 96;  // worked off from so many on
-
-/// A source in coordinates from the centre of the target cluster.
-template <class Real>
-struct alignas(4 * sizeof(Real)) NearSource {
-  Vec3<Real> position;
-  Real mass;
-};
-template <class Real>
-struct NearShared {
-  NearSource<Real> list[kThreads / kWarp][kListed + kWarp];
-};
 
 template <class Real>
 __device__ __forceinline__ Real beyond(Real distance, Real half) {

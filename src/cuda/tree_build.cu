@@ -224,7 +224,10 @@ __global__ void __launch_bounds__(kThreads)
     for (unsigned step = kWarp / 2; step > 0; step /= 2) {
       least = std::fmin(least, __shfl_down_sync(kAllLanes, least, step));
     }
-    for (int k = 0; k < others.count; ++k) least = std::fmax(least, gravity::pull_of_whole(*others.cell[k], group));
+    // Of known length, so that the pointers stay where parameters lie.
+    for (int k = 0; k < OtherRoots::kMost; ++k) {
+      if (k < others.count) least = std::fmax(least, gravity::pull_of_whole(*others.cell[k], group));
+    }
   }
   if (lane == 0) tree.scale[c] = least;
 }

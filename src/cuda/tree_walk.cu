@@ -98,7 +98,8 @@ struct Listing {
     }
   }
 };
-__global__ void __launch_bounds__(kThreads) list_pairs(WalkStep w) {
+// Of a multiprocessor's registers, half: with fewer it would spill.
+__global__ void __launch_bounds__(kThreads, 8) list_pairs(WalkStep w) {
   const unsigned p = thread_number();
   if (p >= w.pairs) return;
   const auto place = [&](ListKind list) { return w.lists[list].cell + w.lists[list].first[p]; };
