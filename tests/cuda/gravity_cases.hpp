@@ -83,6 +83,7 @@ inline Fields evaluate(const Scene& scene, GravityMethod method, const Parameter
   EXPECT_EQ(comm.sum(static_cast<std::uint64_t>(found.size())), position.size());
   fields.rms = std::sqrt(comm.sum(squares) / static_cast<double>(position.size()));
   fields.largest = comm.max(fields.largest) / comm.max(largest_field);
+  EXPECT_TRUE(std::isfinite(fields.rms)) << "a largest value does not show what is no number";
   return fields;
 }
 
