@@ -45,7 +45,7 @@ TEST_P(CudaGravityTest, TreeEqualsHosts) {
 
 // Groups of debris are divided where the host divides them.
 TEST_P(CudaGravityTest, TreeOfDebrisEqualsHosts) {
-  const Fields fields = evaluate(crowd(GetParam()), GravityMethod::kTree, {.precision = GetParam()}, world_);
+  const Fields fields = evaluate(two_crowds(GetParam()), GravityMethod::kTree, {.precision = GetParam()}, world_);
   EXPECT_LE(fields.rms, is_double() ? 1e-12 : 3e-6);
   if (world_.size() == 1) {
     EXPECT_EQ(fields.device_stats.pairs, fields.host_stats.pairs);
