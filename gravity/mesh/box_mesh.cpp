@@ -33,6 +33,12 @@ PlaneRange touched_planes(const ClusterArrays<Real>& particles) {
 
 }  // namespace
 
+Kernel mesh_kernel(const GaussianSplit& split) {
+  return [split](int x, int y, int z) {
+    return unsmeared_long_range_potential(split, kTscSmearing, std::sqrt(1.0 * x * x + 1.0 * y * y + 1.0 * z * z));
+  };
+}
+
 template <class Real>
 BoxMesh<Real>::BoxMesh(const MeshSize& size, const GaussianSplit& split, const mpi::Comm& comm, int threads,
                        const MeshSharing& sharing)
@@ -51,10 +57,7 @@ BoxMesh<Real>::BoxMesh(const MeshSize& size, const GaussianSplit& split, const m
     }
   }
   if (transformers_ == MPI_COMM_NULL) return;
-  const auto kernel = [&](int x, int y, int z) {
-    return unsmeared_long_range_potential(split, kTscSmearing, std::sqrt(1.0 * x * x + 1.0 * y * y + 1.0 * z * z));
-  };
-  convolution_ = std::make_unique<Convolution<Real>>(size, kernel, mpi::Comm(transformers_), threads);
+  convolution_ = std::make_unique<Convolution<Real>>(size, mesh_kernel(split), mpi::Comm(transformers_), threads);
 }
 
 template <class Real>

@@ -22,6 +22,9 @@ struct MeshSharing {
   int least_planes = 4;           ///< of larger ones each rank has as many, or none: fewer cost more to send than to do
 };
 
+/// Potential of the split, in cells, without the smearing that TSC assignment and interpolation add.
+Kernel mesh_kernel(const GaussianSplit& split);
+
 /// A mesh of one size.
 template <class Real>
 class BoxMesh {

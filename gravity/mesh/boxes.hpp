@@ -8,8 +8,6 @@
 
 namespace breccia::gravity {
 
-inline constexpr std::size_t kMostBoxes = 4;
-
 /// What a body must have to get a box.
 inline constexpr std::int64_t kLeastBoxParticles = 1000;
 inline constexpr double kLeastBoxMass = 0.1;  ///< fraction of all mass

@@ -1,19 +1,10 @@
 // Where the nodes of a particle mesh lie.
 #pragma once
 
-#include "breccia/linalg.hpp"
+#include "gravity/mesh/box.hpp"
 #include "gravity/mesh/convolution.hpp"
 
 namespace breccia::gravity {
-
-/// A box of space, [m]. Lower faces belong to it, upper ones do too.
-struct Box {
-  Vec3d low{}, high{};
-
-  [[nodiscard]] bool contains(Vec3d p) const {
-    return p.x >= low.x && p.x <= high.x && p.y >= low.y && p.y <= high.y && p.z >= low.z && p.z <= high.z;
-  }
-};
 
 /// Nodes around the edge that particles do not reach: 1 for the TSC cloud and 3 for 6-point differences, of which the
 /// nearest node takes half a cell.

@@ -12,9 +12,7 @@ Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi:
   layout.set.assign(particles.position.size(), 0);
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (std::size_t i = 0; i < layout.set.size(); ++i) {
-    for (std::size_t k = 0; k < layout.boxes.size() && layout.set[i] == 0; ++k) {
-      if (layout.boxes[k].contains(particles.position[i])) layout.set[i] = static_cast<std::uint8_t>(k + 1);
-    }
+    layout.set[i] = set_of(particles.position[i], layout.boxes.data(), layout.boxes.size());
   }
   for (std::size_t k = 0; k <= layout.boxes.size(); ++k) {
     const auto here = std::count(layout.set.begin(), layout.set.end(), static_cast<std::uint8_t>(k));

@@ -1,6 +1,7 @@
 // Triangular-shaped cloud: masses to nodes, fields to particles, with the same weights.
 #include "breccia/pack.hpp"
 #include "gravity/mesh/mesh_kernels.hpp"
+#include "gravity/mesh/tsc.hpp"
 
 namespace breccia::gravity::BRECCIA_ISA {
 namespace {
@@ -33,10 +34,9 @@ BRECCIA_HD void make_stencil(const ClusterArrays<Real>& particles, std::int64_t 
                 V(particles.centre[axis][cluster] - static_cast<Real>(base));
     const V node = nearest(x);
     const V d = x - node;
-    const V half(Real(0.5));
-    (half * (half - d) * (half - d)).store(stencil.weight[axis][0]);
-    (V(Real(0.75)) - d * d).store(stencil.weight[axis][1]);
-    (half * (half + d) * (half + d)).store(stencil.weight[axis][2]);
+    tsc_beside<Real>(-d).store(stencil.weight[axis][0]);
+    tsc_nearest<Real>(d).store(stencil.weight[axis][1]);
+    tsc_beside<Real>(d).store(stencil.weight[axis][2]);
     Real nodes[kClusterSize];
     node.store(nodes);
     const std::int64_t lowest = base - 1 - (axis == 0 ? first_plane : 0);
@@ -92,13 +92,12 @@ void interpolate_as(const InterpolateTask<Real>& task) {
   }
 }
 
-// f(3) - f(-3), f(2) - f(-2), f(1) - f(-1) weighted so that polynomials up to degree 6 have an exact derivative.
 template <class V>
-BRECCIA_HD V minus_derivative(const typename V::Scalar* at, std::int64_t stride) {
+BRECCIA_HD V minus_derivative_at(const typename V::Scalar* at, std::int64_t stride) {
   using Real = typename V::Scalar;
   const auto pair = [&](std::int64_t k)
                         BRECCIA_INLINE_LAMBDA { return V::load(at - k * stride) - V::load(at + k * stride); };
-  return V(Real(0.75)) * pair(1) - V(Real(0.15)) * pair(2) + V(Real(1.0 / 60.0)) * pair(3);
+  return minus_derivative<Real>(pair(1), pair(2), pair(3));
 }
 
 template <class Real>
@@ -113,9 +112,9 @@ void differences_as(const DifferenceTask<Real>& task) {
         const int from = z < last ? z : last;
         const Real* at = task.potential + (x + 3) * plane + static_cast<std::int64_t>(y) * task.nz + from;
         Real values[4][V::kLanes];
-        minus_derivative<V>(at, plane).store(values[0]);
-        minus_derivative<V>(at, task.nz).store(values[1]);
-        minus_derivative<V>(at, 1).store(values[2]);
+        minus_derivative_at<V>(at, plane).store(values[0]);
+        minus_derivative_at<V>(at, task.nz).store(values[1]);
+        minus_derivative_at<V>(at, 1).store(values[2]);
         V::load(at).store(values[3]);
         Real* to = task.field + 4 * (x * plane + static_cast<std::int64_t>(y) * task.nz + from);
         for (int l = 0; l < V::kLanes; ++l) {

@@ -33,6 +33,11 @@ BRECCIA_HD double density(const Cell& cell) {
   return cell.radius > 0.0 ? cell.moments.mass / detail::cube(cell.radius) : 0.0;
 }
 
+/// Whether a source makes a group near it sparse.
+BRECCIA_HD bool outweighs(const Cell& source, const Cell& group) {
+  return source.count > group.count && density(source) > kDenser * density(group);
+}
+
 enum class Opening : std::uint8_t {
   kOpen,    ///< its children, or its particles
   kWhole,   ///< monopole and quadrupole at each target

@@ -43,4 +43,11 @@ BRECCIA_HD bool contains(const Cell& outer, const Cell& inner) {
   return outer.end > outer.begin && outer.begin <= inner.begin && outer.end >= inner.end;
 }
 
+/// What the whole of another tree does to a cell; inside that tree it says nothing.
+BRECCIA_HD double pull_of_whole(const Cell& whole, const Cell& cell) {
+  const Vec3d d = cell.centre - whole.centre;
+  const double farthest = std::sqrt(dot(d, d)) + cell.radius;
+  return farthest > whole.radius ? whole.moments.mass / (farthest * farthest) : 0.0;
+}
+
 }  // namespace breccia::gravity

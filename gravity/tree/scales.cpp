@@ -95,13 +95,6 @@ double scale_of(const Tree& tree, std::span<const std::int32_t> heavy, const Cel
   return least;
 }
 
-// What the whole of another tree does to a cell; inside that tree it says nothing.
-double pull_of_whole(const Cell& whole, const Cell& cell) {
-  const Vec3d d = cell.centre - whole.centre;
-  const double farthest = std::sqrt(dot(d, d)) + cell.radius;
-  return farthest > whole.radius ? whole.moments.mass / (farthest * farthest) : 0.0;
-}
-
 }  // namespace
 
 std::vector<double> acceleration_scales(const Tree& tree, std::span<const Cell> others, double softening, int threads) {

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "gravity/evaluation.hpp"
+#include "gravity/mesh/box.hpp"
 #include "gravity/tree/shared_tree.hpp"
 #include "gravity/tree/tolerance.hpp"
 
@@ -40,7 +41,6 @@ class UnsplitField {
   void import_sources(Stats& stats);
   void walk_all(std::size_t target, Stats& stats);
   void write(Set& s, double mass_unit, const FieldView& field);
-  [[nodiscard]] static bool interact(std::size_t target, std::size_t source) { return target != source || target == 0; }
 
   Parameters parameters_;
   mpi::Comm comm_;

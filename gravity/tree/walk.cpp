@@ -136,12 +136,9 @@ class Walker {
   // Whether the group is to be divided: something larger near it is denser by far.
   [[nodiscard]] bool is_sparse(const Walking<Real>& w, const Cell& group, Candidates from) const {
     if (group.is_smallest_group()) return false;
-    const double limit = kDenser * density(group);
-    for (std::size_t k = from.begin; k < from.end; ++k) {
-      const Cell& source = sources_.cell(w.candidates[k]);
-      if (source.count > group.count && density(source) > limit) return true;
-    }
-    return false;
+    const auto first = w.candidates.begin();
+    return std::any_of(first + static_cast<std::ptrdiff_t>(from.begin), first + static_cast<std::ptrdiff_t>(from.end),
+                       [&](std::int32_t s) { return outweighs(sources_.cell(s), group); });
   }
 
   // How each of the cells in w.level is to be taken.

@@ -201,7 +201,6 @@ PredictArguments<typename P::Real> CudaEngine<P>::predict_arguments(double time)
 template <class P>
 std::unique_ptr<gravity::ResidentSolver> CudaEngine<P>::make_resident_solver(GravityMethod method,
                                                                              const gravity::Parameters& parameters) {
-  if (!CudaGravity<Real>::has(method)) return nullptr;
   return std::make_unique<CudaGravity<Real>>(
       method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_);
 }

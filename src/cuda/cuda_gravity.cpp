@@ -8,6 +8,8 @@
 #include "breccia/constants.hpp"
 #include "cuda/direct_gravity.hpp"
 #include "gravity/evaluation.hpp"
+#include "gravity/mesh/layout.hpp"
+#include "gravity/mesh/settings.hpp"
 #include "gravity/method.hpp"
 #include "gravity/tree/tolerance.hpp"
 #include "gravity/tree/tree.hpp"
@@ -20,18 +22,13 @@ template <class Real>
 CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles,
                                const mpi::Comm& comm, cudaStream_t stream)
     : method_(method),
-      parameters_(parameters),
+      parameters_(method == GravityMethod::kTreePm ? gravity::with_checked_mesh(parameters) : parameters),
       particles_(std::move(particles)),
       comm_(comm),
       stream_(stream),
       bodies_(comm, stream),
-      tree_(comm, stream),
-      walk_(stream) {}
-
-template <class Real>
-bool CudaGravity<Real>::has(GravityMethod method) {
-  return method == GravityMethod::kDirect || method == GravityMethod::kTree || method == GravityMethod::kAuto;
-}
+      sets_(stream),
+      unsplit_(comm, stream) {}
 
 template <class Real>
 void CudaGravity<Real>::choose_method(unsigned particles) {
@@ -61,7 +58,13 @@ void CudaGravity<Real>::evaluate_and_hold(double time) {
   if (stats_.method == GravityMethod::kDirect) {
     stats_.phases.time(Phase::kPairs, [&] { sum_directly(mass_unit); });
   } else {
-    sum_by_tree(extremes, mass_unit);
+    acceleration_.fill_bytes(0, stream_);
+    const BodyArrays all = bodies_.all();
+    if (stats_.method == GravityMethod::kTree) {
+      sum_unsplit({&all, 1}, extremes, mass_unit);
+    } else {
+      sum_by_mesh(extremes, mass_unit);
+    }
   }
   const Vec3d net = net_force(own);
   launch_hold(acceleration_.data(), net, own.particles, own.count, stream_);
@@ -76,27 +79,44 @@ void CudaGravity<Real>::sum_directly(double mass_unit) {
 }
 
 template <class Real>
-void CudaGravity<Real>::sum_by_tree(const Extremes& extremes, double mass_unit) {
-  const BodyArrays all = bodies_.all();
-  if (all.count == 0) return;
+void CudaGravity<Real>::sum_unsplit(std::span<const BodyArrays> sets, const Extremes& extremes, double mass_unit) {
+  if (bodies_.all().count == 0) return;
   const double(&e)[7] = extremes.of;
-  const gravity::Root root = gravity::random_root({-e[3], -e[4], -e[5]}, {e[0], e[1], e[2]});
-  const double softening = parameters_.softening / root.unit;
-  stats_.phases.time(Phase::kSort,
-                     [&] { tree_.build(all, root, mass_unit, softening, bodies_.first(), bodies_.own()); });
-  stats_.phases.time(Phase::kTree, [&] {
-    walk_.evaluate(tree_,
-                   {.tolerance = gravity::opening_for(parameters_, static_cast<double>(all.count)),
-                    .softening = softening,
-                    .first = bodies_.first(),
-                    .own = bodies_.own(),
-                    .unit = kGravitationalConstant * mass_unit / (root.unit * root.unit)},
-                   acceleration_.data());
-    const WalkCounts counts = walk_.counts();
-    stats_.pairs = static_cast<double>(counts.pairs);
-    stats_.cell_interactions = static_cast<double>(counts.cells);
-    stats_.expansions = static_cast<double>(counts.expansions);
+  unsplit_.add_field(sets,
+                     {.root = gravity::random_root({-e[3], -e[4], -e[5]}, {e[0], e[1], e[2]}),
+                      .mass_unit = mass_unit,
+                      .softening = parameters_.softening,
+                      .tolerance = gravity::opening_for(parameters_, static_cast<double>(bodies_.all().count)),
+                      .first = bodies_.first(),
+                      .own = bodies_.own()},
+                     acceleration_.data(), stats_);
+}
+
+// Boxes are chosen on the host, by its rule.
+template <class Real>
+void CudaGravity<Real>::sum_by_mesh(const Extremes& extremes, double mass_unit) {
+  gravity::Layout layout;
+  stats_.phases.time(Phase::kBoxes, [&] {
+    const HostBodies own = bodies_.own_on_host();
+    layout = gravity::lay_boxes({own.position, own.mass}, parameters_.mesh, comm_, 1);
+    parameters_.mesh.particle_spacing = layout.spacing;
+    sets_.divide(bodies_.all(), layout.boxes);
   });
+  const std::span<const BodyArrays> sets = sets_.sets();
+  stats_.boxes = static_cast<int>(layout.boxes.size());
+  while (boxes_.size() < layout.boxes.size()) boxes_.push_back(std::make_unique<BoxGravity<Real>>(comm_, stream_));
+  for (std::size_t k = 0; k < layout.boxes.size(); ++k) {
+    boxes_[k]->add_field(sets[k + 1],
+                         {.box = layout.boxes[k],
+                          .cell = layout.cell,
+                          .spacing = layout.spacing,
+                          .split = gravity::split_of_box(parameters_, layout.cell, layout.count[k + 1]),
+                          .mass_unit = mass_unit},
+                         bodies_.first(), bodies_.own(), acceleration_.data(), stats_);
+  }
+  const bool all_in_one = stats_.boxes == 1 && sets[0].count == 0;
+  if (!all_in_one) sum_unsplit(sets, extremes, mass_unit);
+  stats_.bytes_sent += stats_.phases.bytes_sent;
 }
 
 // Books the momentum error; returns what is to be taken off each particle, as a share of its |a|.

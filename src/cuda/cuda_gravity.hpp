@@ -4,9 +4,10 @@
 
 #include <functional>
 
-#include "cuda/device_tree.hpp"
+#include "cuda/body_sets.hpp"
+#include "cuda/box_gravity.hpp"
 #include "cuda/gravity_bodies.hpp"
-#include "cuda/tree_gravity.hpp"
+#include "cuda/unsplit_gravity.hpp"
 #include "gravity/resident.hpp"
 
 namespace breccia::cuda {
@@ -23,16 +24,14 @@ class CudaGravity final : public gravity::ResidentSolver {
   CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles, const mpi::Comm& comm,
               cudaStream_t stream);
 
-  /// True if the device has this method.
-  static bool has(GravityMethod method);
-
   void evaluate_and_hold(double time) override;
   [[nodiscard]] const gravity::Stats& last() const override { return stats_; }
 
  private:
   void choose_method(unsigned particles);
   void sum_directly(double mass_unit);
-  void sum_by_tree(const Extremes& extremes, double mass_unit);
+  void sum_unsplit(std::span<const BodyArrays> sets, const Extremes& extremes, double mass_unit);
+  void sum_by_mesh(const Extremes& extremes, double mass_unit);
   Vec3d net_force(const PredictArguments<Real>& own);
 
   GravityMethod method_;
@@ -42,8 +41,9 @@ class CudaGravity final : public gravity::ResidentSolver {
   cudaStream_t stream_;
   gravity::Stats stats_;
   GravityBodies<Real> bodies_;
-  DeviceTree tree_;
-  TreeGravity<Real> walk_;
+  BodySets sets_;
+  std::vector<std::unique_ptr<BoxGravity<Real>>> boxes_;  // those that there ever were
+  UnsplitGravity<Real> unsplit_;
   DeviceArray<double> acceleration_;  // [3][own] [m/s2]
   DeviceArray<double> scratch_;
   DeviceArray<NetForce> net_forces_;

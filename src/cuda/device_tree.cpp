@@ -19,22 +19,24 @@ void lengthen(DeviceArray<T>& array, std::size_t used, std::size_t size, cudaStr
 
 }  // namespace
 
-void DeviceTree::build(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, double softening,
-                       unsigned first, unsigned own) {
+void DeviceTree::build(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, unsigned first,
+                       unsigned own) {
+  count_ = bodies.count;
+  if (count_ == 0) return;
   sort(bodies, root, mass_unit, first, own);
   grow();
   for (auto level = levels_.rbegin(); level != levels_.rend(); ++level) {
     launch_moments(view(), this->bodies(), *level, stream_);
   }
-  weigh(softening);
 }
 
-void DeviceTree::weigh(double softening) {
+void DeviceTree::weigh(const OtherRoots& others, double softening) {
+  if (count_ == 0) return;
   heavy_.reserve(1);
   heavy_.fill_bytes(0, stream_);
   const std::int64_t coarse = gravity::coarse_limit(count_);
   launch_list_heavy(view(), coarse, heavy_.data(), stream_);
-  launch_sample_scales(view(), bodies(), heavy_.data(), coarse, softening, stream_);
+  launch_sample_scales(view(), bodies(), heavy_.data(), others, coarse, softening, stream_);
   if (comm_.size() > 1) share_scales();
   for (auto level = levels_.rbegin(); level != levels_.rend(); ++level) {
     launch_combine_scales(view(), *level, stream_);
@@ -43,7 +45,6 @@ void DeviceTree::weigh(double softening) {
 
 void DeviceTree::sort(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, unsigned first,
                       unsigned own) {
-  count_ = bodies.count;
   keys_.reserve(count_);
   order_.reserve(count_);
   own_before_.reserve(std::size_t{count_} + 1);

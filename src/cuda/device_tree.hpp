@@ -1,4 +1,4 @@
-// The tree of gravity over the bodies of all ranks, built and kept in device memory. It is the tree of the host
+// A tree of gravity over bodies of all ranks, built and kept in device memory. It is the tree of the host
 // (gravity/tree/tree.hpp), cell by cell, on any number of ranks.
 #pragma once
 
@@ -15,18 +15,19 @@ class DeviceTree {
  public:
   DeviceTree(const mpi::Comm& comm, cudaStream_t stream) : comm_(comm), stream_(stream) {}
 
-  /// Sorts the bodies, of which [first, first + own) are this rank's, grows the tree and weighs its cells. There must
-  /// be one. The host waits once for each level.
-  void build(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, double softening, unsigned first,
-             unsigned own);
+  /// Sorts the bodies and grows the tree; of the bodies of all ranks [first, first + own) are this rank's. The host
+  /// waits once for each level.
+  void build(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, unsigned first, unsigned own);
+  /// Weighs the cells by gravity::acceleration_scales().
+  void weigh(const OtherRoots& others, double softening);
 
+  [[nodiscard]] bool empty() const { return count_ == 0; }
   [[nodiscard]] TreeView view() const;
   [[nodiscard]] SortedBodies bodies() const;
 
  private:
   void sort(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, unsigned first, unsigned own);
   void grow();
-  void weigh(double softening);
   void make_room(unsigned cells);
   void share_scales();
 

@@ -14,6 +14,10 @@ struct BodyArrays {
   const double* position[3] = {nullptr, nullptr, nullptr};
   const double* mass = nullptr;
   unsigned count = 0;
+  const unsigned* index = nullptr;  ///< place of each among the bodies of all ranks; null: these are they
+
+  [[nodiscard]] BRECCIA_HD Vec3d at(unsigned i) const { return {position[0][i], position[1][i], position[2][i]}; }
+  [[nodiscard]] BRECCIA_HD unsigned place(unsigned i) const { return index == nullptr ? i : index[i]; }
 };
 
 /// Where positions repeat: lengths of 0 do not [m].

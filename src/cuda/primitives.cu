@@ -140,6 +140,23 @@ __global__ void place_pairs(const std::uint64_t* keys, const unsigned* values, u
   }
 }
 
+// --- keys -----------------------------------------------------------------------------------------------------------
+
+__global__ void find_first(const std::uint64_t* sorted, unsigned count, unsigned keys, unsigned* first) {
+  const unsigned k = blockIdx.x * kThreads + threadIdx.x;
+  if (k > keys) return;
+  unsigned low = 0;
+  for (unsigned high = count; low < high;) {
+    const unsigned middle = low + (high - low) / 2;
+    if (sorted[middle] < k) {
+      low = middle + 1;
+    } else {
+      high = middle;
+    }
+  }
+  first[k] = low;
+}
+
 }  // namespace
 
 void exclusive_scan(unsigned* values, unsigned count, PrimitiveScratch& scratch, cudaStream_t stream) {
@@ -164,6 +181,12 @@ void radix_sort(DeviceArray<std::uint64_t>& keys, DeviceArray<unsigned>& values,
     values.swap(scratch.values);
   }
   check(cudaGetLastError(), "launch of a sort");
+}
+
+void first_of_keys(const std::uint64_t* sorted, unsigned count, unsigned keys, unsigned* first, cudaStream_t stream) {
+  BRECCIA_LAUNCH(find_first, dim3(blocks_for(keys + 1, kThreads)), dim3(kThreads), 0, stream, sorted, count, keys,
+                 first);
+  check(cudaGetLastError(), "launch of a search for keys");
 }
 
 }  // namespace breccia::cuda

@@ -25,4 +25,7 @@ void exclusive_scan(unsigned* values, unsigned count, PrimitiveScratch& scratch,
 void radix_sort(DeviceArray<std::uint64_t>& keys, DeviceArray<unsigned>& values, unsigned count, int first_bit,
                 int last_bit, PrimitiveScratch& scratch, cudaStream_t stream);
 
+/// first[k] := place of the first of the sorted keys that is not below k, for k = 0 .. keys.
+void first_of_keys(const std::uint64_t* sorted, unsigned count, unsigned keys, unsigned* first, cudaStream_t stream);
+
 }  // namespace breccia::cuda

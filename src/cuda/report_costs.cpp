@@ -3,6 +3,7 @@
 #include <cstdio>
 
 #include "cuda/counted.hpp"
+#include "cuda/near_list.cuh"
 #include "cuda/tile_pass.cuh"
 #include "cuda/traffic.hpp"
 #include "cuda/tree_tiles.cuh"
@@ -38,10 +39,11 @@ template <class Real>
 void print(const char* name, long operations, const char* end) {
   std::printf(
       "  {\"real\": \"%s\", \"tile_shared\": %zu, \"lone_shared\": %zu, \"pair_tile\": %zu, \"group_tiles\": %zu, "
+      "\"near_lists\": %zu, "
       "\"threads\": %d, \"tile_bytes_particle\": %d,\n"
       "   \"tile_bytes_grid\": %.1f, \"node_bytes\": %.1f, \"operations\": %ld}%s\n",
       name, sizeof(TileShared<Real>), kPassThreads * sizeof(ThreadWork), sizeof(PairTile<Real>),
-      sizeof(GroupShared<Real>), kPassThreads, particle_bytes<Real>(),
+      sizeof(GroupShared<Real>), sizeof(NearShared<Real>), kPassThreads, particle_bytes<Real>(),
       (kVelocities * kTileNodes + kSums * kBox * kBox * kBox) * static_cast<double>(sizeof(Real)) /
           (kParticlesPerCell * grid::kBlockNodes),
       (kSums * kBox * kBox * kBox + kSums * grid::kBlockNodes) * static_cast<double>(sizeof(Real)) /

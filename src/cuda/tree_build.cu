@@ -33,15 +33,11 @@ struct MassOf {
 
 // --- bodies ---------------------------------------------------------------------------------------------------------
 
-__device__ __forceinline__ Vec3d body_position(const BodyArrays& bodies, unsigned i) {
-  return {bodies.position[0][i], bodies.position[1][i], bodies.position[2][i]};
-}
-
 __global__ void __launch_bounds__(kThreads)
     tree_keys(BodyArrays bodies, gravity::Root root, double cells_per_unit, std::uint64_t* keys, unsigned* order) {
   const unsigned i = thread_number();
   if (i >= bodies.count) return;
-  keys[i] = gravity::morton_key(root.scaled(body_position(bodies, i)), cells_per_unit);
+  keys[i] = gravity::morton_key(root.scaled(bodies.at(i)), cells_per_unit);
   order[i] = i;
 }
 
@@ -52,12 +48,13 @@ __global__ void __launch_bounds__(kThreads)
   if (i == 0) is_own[bodies.count] = 0;
   if (i >= bodies.count) return;
   const unsigned from = sorted.order[i];
-  const Vec3d x = root.scaled(body_position(bodies, from));
+  const Vec3d x = root.scaled(bodies.at(from));
   sorted.position[0][i] = x.x;
   sorted.position[1][i] = x.y;
   sorted.position[2][i] = x.z;
   sorted.mass[i] = bodies.mass[from] / mass_unit;
-  is_own[i] = from - first < own ? 1U : 0U;
+  sorted.order[i] = bodies.place(from);
+  is_own[i] = sorted.order[i] - first < own ? 1U : 0U;
 }
 
 // --- cells ----------------------------------------------------------------------------------------------------------
@@ -206,8 +203,9 @@ __device__ __forceinline__ Vec3d sampled_field(const TreeView& tree, const Cell&
   return sum;
 }
 
-__global__ void __launch_bounds__(kThreads) sample_scales(TreeView tree, SortedBodies sorted, const HeavyCells* heavy,
-                                                          float softening_squared, std::int64_t coarse) {
+__global__ void __launch_bounds__(kThreads)
+    sample_scales(TreeView tree, SortedBodies sorted, const HeavyCells* heavy, OtherRoots others,
+                  float softening_squared, std::int64_t coarse) {
   const unsigned c = thread_number() / kWarp;
   if (c >= tree.count) return;
   const Cell& group = tree.cells[c];
@@ -225,6 +223,10 @@ __global__ void __launch_bounds__(kThreads) sample_scales(TreeView tree, SortedB
     least = std::sqrt(dot(a, a));
     for (unsigned step = kWarp / 2; step > 0; step /= 2) {
       least = std::fmin(least, __shfl_down_sync(kAllLanes, least, step));
+    }
+    // Of known length, so that the pointers stay where parameters lie.
+    for (int k = 0; k < OtherRoots::kMost; ++k) {
+      if (k < others.count) least = std::fmax(least, gravity::pull_of_whole(*others.cell[k], group));
     }
   }
   if (lane == 0) tree.scale[c] = least;
@@ -290,8 +292,8 @@ void launch_list_heavy(const TreeView& tree, std::int64_t coarse_limit, HeavyCel
 }
 
 void launch_sample_scales(const TreeView& tree, const SortedBodies& sorted, const HeavyCells* heavy,
-                          std::int64_t coarse_limit, double softening, cudaStream_t stream) {
-  BRECCIA_LAUNCH(sample_scales, warps_for(tree.count), dim3(kThreads), 0, stream, tree, sorted, heavy,
+                          const OtherRoots& others, std::int64_t coarse_limit, double softening, cudaStream_t stream) {
+  BRECCIA_LAUNCH(sample_scales, warps_for(tree.count), dim3(kThreads), 0, stream, tree, sorted, heavy, others,
                  static_cast<float>(softening * softening), coarse_limit);
   launched();
 }

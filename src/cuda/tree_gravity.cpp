@@ -5,18 +5,24 @@
 namespace breccia::cuda {
 
 template <class Real>
-void TreeGravity<Real>::evaluate(const DeviceTree& tree, const Settings& settings, double* acceleration) {
+void TreeGravity<Real>::clear_counts() {
   counts_.reserve(1);
   counts_.fill_bytes(0, stream_);
-  if (settings.own == 0) return;
+}
+
+template <class Real>
+void TreeGravity<Real>::add_field(const DeviceTree& targets, const DeviceTree& sources, const Settings& settings,
+                                  double* acceleration) {
+  if (settings.own == 0 || targets.empty() || sources.empty()) return;
   Front* here = &fronts_[0];
   Front* next = &fronts_[1];
   start(*here);
   while (here->targets > 0) {
-    WalkStep step = step_of(tree, settings, *here);
+    WalkStep step = step_of(targets, sources, settings, *here);
+    launch_divide(step, stream_);
     const unsigned leaves = place_candidates(step);
     launch_expand<Real>(step, stream_);
-    sum_groups(step, leaves, tree, settings, acceleration);
+    sum_groups(step, leaves, targets, sources, settings, acceleration);
     descend(step, *next);
     candidates_.swap(lists_[kWhole].cell);
     std::swap(here, next);
@@ -28,7 +34,7 @@ template <class Real>
 void TreeGravity<Real>::start(Front& front) {
   front.targets = front.pairs = 1;
   front.target.reserve(1);
-  front.target.upload(std::vector<WalkTarget>{{0, 0, 1}}, stream_);
+  front.target.upload(std::vector<WalkTarget>{{0, 0, 0, 1, false}}, stream_);
   front.pair_first.reserve(2);
   front.pair_first.upload(std::vector<unsigned>{0, 1}, stream_);
   front.far.reserve(1);
@@ -38,9 +44,11 @@ void TreeGravity<Real>::start(Front& front) {
 }
 
 template <class Real>
-WalkStep TreeGravity<Real>::step_of(const DeviceTree& tree, const Settings& settings, const Front& front) {
+WalkStep TreeGravity<Real>::step_of(const DeviceTree& targets, const DeviceTree& sources, const Settings& settings,
+                                    const Front& front) {
   WalkStep step;
-  step.tree = tree.view();
+  step.tree = targets.view();
+  step.sources = sources.view();
   step.targets = front.targets;
   step.target = front.target.data();
   step.pair_first = front.pair_first.data();
@@ -72,13 +80,14 @@ unsigned TreeGravity<Real>::place_candidates(WalkStep& step) {
 }
 
 template <class Real>
-void TreeGravity<Real>::sum_groups(const WalkStep& step, unsigned leaves, const DeviceTree& tree,
-                                   const Settings& settings, double* acceleration) {
+void TreeGravity<Real>::sum_groups(const WalkStep& step, unsigned leaves, const DeviceTree& targets,
+                                   const DeviceTree& sources, const Settings& settings, double* acceleration) {
   leaf_first_.reserve(std::size_t{leaves} + 1);
   launch_leaf_sizes(step, leaves, leaf_first_.data(), stream_);
   exclusive_scan(leaf_first_.data(), leaves + 1, scratch_, stream_);
   launch_sum_groups<Real>(step,
-                          {.bodies = tree.bodies(),
+                          {.bodies = targets.bodies(),
+                           .sources = sources.bodies(),
                            .leaf_first = leaf_first_.data(),
                            .first = settings.first,
                            .own = settings.own,

@@ -1,5 +1,5 @@
-// The field of all bodies at those of this rank by the tree, on the device: the walk of gravity/tree/walk.hpp, depth by
-// depth.
+// The field of a tree's bodies at those of this rank in a tree, on the device: the walk of gravity/tree/walk.hpp,
+// depth by depth.
 #pragma once
 
 #include "cuda/device_tree.hpp"
@@ -17,10 +17,12 @@ class TreeGravity {
     unsigned first, own;  ///< this rank's among the bodies of all ranks
     double unit;          ///< of accelerations [m/s2]
   };
-  /// acceleration[3][own]. The host waits twice for each depth.
-  void evaluate(const DeviceTree& tree, const Settings& settings, double* acceleration);
+  void clear_counts();
+  /// Adds the field of `sources` to acceleration[3][own] of the bodies in `targets`, the same tree or another one of
+  /// the same root. The host waits twice for each depth.
+  void add_field(const DeviceTree& targets, const DeviceTree& sources, const Settings& settings, double* acceleration);
 
-  /// Of the last evaluation. The host waits.
+  /// Of all fields since they were cleared. The host waits.
   [[nodiscard]] WalkCounts counts() const { return counts_.download(1, stream_)[0]; }
 
  private:
@@ -37,11 +39,12 @@ class TreeGravity {
   };
 
   void start(Front& front);
-  [[nodiscard]] WalkStep step_of(const DeviceTree& tree, const Settings& settings, const Front& front);
+  [[nodiscard]] WalkStep step_of(const DeviceTree& targets, const DeviceTree& sources, const Settings& settings,
+                                 const Front& front);
   // Number of listed leaves.
   unsigned place_candidates(WalkStep& step);
-  void sum_groups(const WalkStep& step, unsigned leaves, const DeviceTree& tree, const Settings& settings,
-                  double* acceleration);
+  void sum_groups(const WalkStep& step, unsigned leaves, const DeviceTree& targets, const DeviceTree& sources,
+                  const Settings& settings, double* acceleration);
   void descend(const WalkStep& step, Front& next);
 
   cudaStream_t stream_;

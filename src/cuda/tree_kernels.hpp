@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "cuda/gravity_kernels.hpp"
+#include "gravity/mesh/box.hpp"
 #include "gravity/tree/cell.hpp"
 #include "gravity/tree/morton.hpp"
 #include "gravity/tree/splitting.hpp"
@@ -20,7 +21,7 @@ enum class Role : std::uint32_t { kTrunk, kGroup, kPart };
 struct SortedBodies {
   double* position[3] = {nullptr, nullptr, nullptr};
   double* mass = nullptr;
-  const unsigned* order = nullptr;       ///< index among the bodies of all ranks
+  unsigned* order = nullptr;             ///< index among the bodies of all ranks
   const std::uint64_t* key = nullptr;    ///< Morton keys
   const unsigned* own_before = nullptr;  ///< [count + 1] how many of the bodies before each are of this rank
   unsigned count = 0;
@@ -41,8 +42,9 @@ struct Level {
 /// keys[i] and order[i] := i of the bodies.
 void launch_tree_keys(const BodyArrays& bodies, const gravity::Root& root, std::uint64_t* keys, unsigned* order,
                       cudaStream_t stream);
-/// Fills positions and masses in units of `mass_unit`, in the order of the keys; is_own[i] := 1 for those of this rank,
-/// bodies [first, first + own), is_own[count] := 0.
+/// Fills positions and masses in units of `mass_unit`, in the order of the keys, of which `sorted.order` tells the
+/// place among `bodies`; then it tells the place among those of all ranks. is_own[i] := 1 for those of this rank, which
+/// are [first, first + own) of them, is_own[count] := 0.
 void launch_arrange_bodies(const BodyArrays& bodies, const gravity::Root& root, double mass_unit, unsigned first,
                            unsigned own, const SortedBodies& sorted, unsigned* is_own, cudaStream_t stream);
 /// The root cell.
@@ -69,16 +71,24 @@ struct HeavyCells {
   std::int32_t cell[kMost];
 };
 void launch_list_heavy(const TreeView& tree, std::int64_t coarse_limit, HeavyCells* heavy, cudaStream_t stream);
+/// The roots of the trees of other bodies, in device memory.
+struct OtherRoots {
+  static constexpr int kMost = static_cast<int>(gravity::kMostBoxes);
+  const gravity::Cell* cell[kMost] = {nullptr, nullptr, nullptr, nullptr};
+  int count = 0;
+};
 /// Scales of all groups that hold bodies of this rank; the largest double for other cells.
 void launch_sample_scales(const TreeView& tree, const SortedBodies& sorted, const HeavyCells* heavy,
-                          std::int64_t coarse_limit, double softening, cudaStream_t stream);
+                          const OtherRoots& others, std::int64_t coarse_limit, double softening, cudaStream_t stream);
 /// Scales of the trunk cells of a level from their children.
 void launch_combine_scales(const TreeView& tree, Level level, cudaStream_t stream);
 
 /// A target cell of one step down the tree with the cells that are still to be placed for it.
 struct WalkTarget {
   std::int32_t cell;
-  unsigned begin, end;  ///< in WalkStep::candidates
+  std::int32_t weighed;  ///< the cell whose scale counts: this one, or for a part the group that it is of
+  unsigned begin, end;   ///< in WalkStep::candidates
+  bool divides;          ///< above the groups, or a sparse group: what is left passes to the children
 };
 using FarField = gravity::LocalExpansion<double>;
 
@@ -97,9 +107,10 @@ struct WalkCounts {
 
 /// One step of the walk: target cells of a depth, each with its candidates. A pair is a target and a candidate.
 struct WalkStep {
-  TreeView tree;
+  TreeView tree;     ///< of the targets
+  TreeView sources;  ///< the same tree, or one of other bodies
   unsigned targets = 0;
-  const WalkTarget* target = nullptr;
+  WalkTarget* target = nullptr;
   const unsigned* pair_first = nullptr;  ///< [targets + 1]
   const std::int32_t* candidates = nullptr;
   unsigned pairs = 0;
@@ -109,6 +120,8 @@ struct WalkStep {
   FarField* far = nullptr;  ///< [targets] what the cells above expanded, to which this step adds
   WalkCounts* counts = nullptr;
 };
+/// Finds out which targets divide: those above the groups, and sparse groups (gravity/tree/walk.cpp).
+void launch_divide(const WalkStep& step, cudaStream_t stream);
 /// Counts what each pair gives each list; the entries after the last pair are 0.
 void launch_count_pairs(const WalkStep& step, cudaStream_t stream);
 /// Fills the lists.
@@ -131,9 +144,10 @@ void launch_descend(const WalkStep& step, const Descent& d, cudaStream_t stream)
 /// leaf_first[l] := particles of the listed leaf l, 0 after the last.
 void launch_leaf_sizes(const WalkStep& step, unsigned leaves, unsigned* leaf_first, cudaStream_t stream);
 
-/// Fields of the groups among the targets.
+/// Fields of the groups among the targets, added to what is there.
 struct GroupSums {
-  SortedBodies bodies;
+  SortedBodies bodies;  ///< of the targets
+  SortedBodies sources;
   const unsigned* leaf_first = nullptr;  ///< scanned
   unsigned first = 0, own = 0;           ///< this rank's among the bodies of all ranks
   double unit = 1;                       ///< of the accelerations [m/s2]

@@ -40,7 +40,7 @@ __global__ void __launch_bounds__(kThreads) expand_cells(WalkStep w) {
   gravity::LocalExpansion<Real> sum{};
   for (unsigned k = begin + threadIdx.x % kWarp; k < end; k += kWarp) {
     DistantCell<Real> source;
-    source.set(w.tree.cells[list.cell[k]], centre);
+    source.set(w.sources.cells[list.cell[k]], centre);
     const Vec3<Real> x = -source.position;
     gravity::add_field_of(source.moments, x, inverse_root(dot(x, x) + softening_squared), sum);
   }
@@ -59,6 +59,7 @@ __device__ __forceinline__ Vec3d position_of(const SortedBodies& bodies, unsigne
 struct Group {
   Vec3d centre;
   unsigned begin, end;                // particles
+  unsigned own_sources;               // of them that act on each other: all, or none
   unsigned first_cell, last_cell;     // of the list of whole cells
   unsigned first_leaf, last_leaf;     // of the list of leaves
   unsigned first_source, end_source;  // of all particles of all listed leaves
@@ -72,7 +73,7 @@ __device__ __forceinline__ Vec3d field_of_cells(const WalkStep& w, const Group& 
   for (unsigned from = g.first_cell; from < g.last_cell; from += kTileCells) {
     const unsigned count = g.last_cell - from < kTileCells ? g.last_cell - from : kTileCells;
     if (threadIdx.x < count) {
-      tile.cell[threadIdx.x].set(w.tree.cells[w.lists[kWhole].cell[from + threadIdx.x]], g.centre);
+      tile.cell[threadIdx.x].set(w.sources.cells[w.lists[kWhole].cell[from + threadIdx.x]], g.centre);
     }
     __syncthreads();
     Vec3<Real> sum{};
@@ -94,15 +95,15 @@ __device__ __forceinline__ unsigned leaf_particle(const WalkStep& w, const Group
     const unsigned middle = low + (high - low) / 2;
     (s.leaf_first[middle] <= k ? low : high) = middle;
   }
-  return static_cast<unsigned>(w.tree.cells[w.lists[kLeaves].cell[low]].begin) + (k - s.leaf_first[low]);
+  return static_cast<unsigned>(w.sources.cells[w.lists[kLeaves].cell[low]].begin) + (k - s.leaf_first[low]);
 }
 
-// The same for particles: first the group's own, then those of the leaves.
+// The same for particles: first the group's own where they are sources, then those of the leaves.
 template <class Real>
 __device__ __forceinline__ Vec3d field_of_particles(const WalkStep& w, const GroupSums& s, const Group& g,
                                                     PairTile<Real>& tile, const PointMass<Real>& target,
                                                     Real softening_squared) {
-  const unsigned own = g.end - g.begin;
+  const unsigned own = g.own_sources;
   const unsigned all = own + (g.end_source - g.first_source);
   Vec3d total{};
   for (unsigned from = 0; from < all; from += kTileSources) {
@@ -110,7 +111,7 @@ __device__ __forceinline__ Vec3d field_of_particles(const WalkStep& w, const Gro
     if (threadIdx.x < count) {
       const unsigned k = from + threadIdx.x;
       const unsigned j = k < own ? g.begin + k : leaf_particle(w, s, g, g.first_source + (k - own));
-      tile.source[threadIdx.x].set(position_of(s.bodies, j) - g.centre, s.bodies.mass[j]);
+      tile.source[threadIdx.x].set(position_of(s.sources, j) - g.centre, s.sources.mass[j]);
     }
     __syncthreads();
     total += sum_of_tile(tile, count, target, softening_squared);
@@ -134,6 +135,7 @@ __device__ __forceinline__ Group group_of(const WalkStep& w, const GroupSums& s,
   g.centre = cell.centre;
   g.begin = static_cast<unsigned>(cell.begin);
   g.end = static_cast<unsigned>(cell.end);
+  g.own_sources = w.sources.cells == w.tree.cells ? g.end - g.begin : 0U;
   g.first_cell = w.lists[kWhole].first[first_pair];
   g.last_cell = w.lists[kWhole].first[last_pair];
   g.first_leaf = w.lists[kLeaves].first[first_pair];
@@ -145,7 +147,7 @@ __device__ __forceinline__ Group group_of(const WalkStep& w, const GroupSums& s,
 
 __device__ __forceinline__ void count_interactions(const Group& g, WalkCounts& counts) {
   const unsigned long long targets = g.end - g.begin;
-  atomicAdd(&counts.pairs, targets * (targets + (g.end_source - g.first_source)));
+  atomicAdd(&counts.pairs, targets * (g.own_sources + (g.end_source - g.first_source)));
   atomicAdd(&counts.cells, targets * (g.last_cell - g.first_cell));
 }
 
@@ -154,7 +156,7 @@ template <class Real>
 __global__ void __launch_bounds__(kThreads) sum_groups(WalkStep w, GroupSums s) {
   BRECCIA_SHARED(GroupShared<Real>, shared);
   const unsigned t = blockIdx.x;
-  if (w.tree.role[w.target[t].cell] != Role::kGroup) return;
+  if (w.target[t].divides) return;
   const Group g = group_of(w, s, t);
   const auto softening_squared = static_cast<Real>(w.softening * w.softening);
   // More than a block's threads only where many particles lie on one point.
@@ -169,9 +171,9 @@ __global__ void __launch_bounds__(kThreads) sum_groups(WalkStep w, GroupSums s) 
     sum += field_of_particles(w, s, g, shared.pairs, target, softening_squared);
     const unsigned to = s.bodies.order[i] - s.first;
     if (first + threadIdx.x >= g.end || to >= s.own) continue;
-    s.acceleration[to] = s.unit * sum.x;
-    s.acceleration[s.own + to] = s.unit * sum.y;
-    s.acceleration[2 * std::size_t{s.own} + to] = s.unit * sum.z;
+    s.acceleration[to] += s.unit * sum.x;
+    s.acceleration[s.own + to] += s.unit * sum.y;
+    s.acceleration[2 * std::size_t{s.own} + to] += s.unit * sum.z;
   }
   if (threadIdx.x == 0) count_interactions(g, *w.counts);
 }

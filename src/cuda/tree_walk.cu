@@ -2,6 +2,7 @@
 // thread takes one candidate of one target; what it finds is counted, scanned and listed.
 #include "cuda/check.hpp"
 #include "cuda/launchers.hpp"
+#include "cuda/search.cuh"
 #include "cuda/tree_kernels.hpp"
 #include "gravity/tree/opening.hpp"
 
@@ -12,19 +13,10 @@ using gravity::Cell;
 using gravity::Opening;
 
 constexpr unsigned kThreads = 128;
+constexpr unsigned kWarp = 32;
+constexpr unsigned kAllLanes = 0xffffffffU;
 
 __device__ __forceinline__ unsigned thread_number() { return blockIdx.x * kThreads + threadIdx.x; }
-
-// Last of the sorted first[0 .. count] that is not above p.
-__device__ __forceinline__ unsigned place_of(unsigned p, const unsigned* first, unsigned count) {
-  unsigned low = 0;
-  unsigned high = count;
-  while (high - low > 1) {
-    const unsigned middle = low + (high - low) / 2;
-    (first[middle] <= p ? low : high) = middle;
-  }
-  return low;
-}
 
 enum class Fate { kOpen, kListed, kSkipped };
 struct Decision {
@@ -40,8 +32,8 @@ __device__ __forceinline__ Decision for_trunk(const Cell& source, const Cell& ta
 }
 
 // Groups take what is left in one way or the other. Their own particles come first of all.
-__device__ __forceinline__ Decision for_group(const Cell& source, const Cell& group, double allowed) {
-  if (source.begin >= group.begin && source.end <= group.end) return {Fate::kSkipped, kWhole};
+__device__ __forceinline__ Decision for_group(const Cell& source, const Cell& group, double allowed, bool same_tree) {
+  if (same_tree && source.begin >= group.begin && source.end <= group.end) return {Fate::kSkipped, kWhole};
   const Opening how = source.count > gravity::kFewParticles ? gravity::opening(source, group, allowed) : Opening::kOpen;
   if (how == Opening::kExpand) return {Fate::kListed, kExpanded};
   if (how == Opening::kWhole) return {Fate::kListed, kWhole};
@@ -54,16 +46,31 @@ __device__ __forceinline__ void place_pair(const WalkStep& w, unsigned p, Take& 
   const unsigned t = place_of(p, w.pair_first, w.targets);
   const WalkTarget& target = w.target[t];
   const Cell& cell = w.tree.cells[target.cell];
-  const bool trunk = w.tree.role[target.cell] == Role::kTrunk;
-  const double allowed = w.tolerance * w.tree.scale[target.cell];
+  const double allowed = w.tolerance * w.tree.scale[target.weighed];
+  const bool same_tree = w.sources.cells == w.tree.cells;
   const std::int32_t candidate = w.candidates[target.begin + (p - w.pair_first[t])];
-  const std::int32_t end = w.tree.next[candidate];
+  const std::int32_t end = w.sources.next[candidate];
   for (std::int32_t s = candidate; s != end;) {
-    const Cell& source = w.tree.cells[s];
-    const Decision d = trunk ? for_trunk(source, cell, allowed) : for_group(source, cell, allowed);
+    const Cell& source = w.sources.cells[s];
+    const Decision d = target.divides ? for_trunk(source, cell, allowed) : for_group(source, cell, allowed, same_tree);
     if (d.fate == Fate::kListed) take(d.list, s);
-    s = d.fate == Fate::kOpen ? source.first_child : w.tree.next[s];
+    s = d.fate == Fate::kOpen ? source.first_child : w.sources.next[s];
   }
+}
+
+// A warp for each target.
+__global__ void __launch_bounds__(kThreads) divide(WalkStep w) {
+  const unsigned t = thread_number() / kWarp;
+  if (t >= w.targets) return;
+  WalkTarget& target = w.target[t];
+  const Cell& cell = w.tree.cells[target.cell];
+  const bool trunk = w.tree.role[target.cell] == Role::kTrunk;
+  bool outweighed = false;
+  for (unsigned k = target.begin + threadIdx.x % kWarp; k < target.end && !trunk; k += kWarp) {
+    outweighed = outweighed || gravity::outweighs(w.sources.cells[w.candidates[k]], cell);
+  }
+  const bool sparse = __ballot_sync(kAllLanes, outweighed ? 1 : 0) != 0 && !cell.is_smallest_group();
+  if (threadIdx.x % kWarp == 0) target.divides = trunk || sparse;
 }
 
 struct Counting {
@@ -91,7 +98,8 @@ struct Listing {
     }
   }
 };
-__global__ void __launch_bounds__(kThreads) list_pairs(WalkStep w) {
+// Of a multiprocessor's registers, half: with fewer it would spill.
+__global__ void __launch_bounds__(kThreads, 8) list_pairs(WalkStep w) {
   const unsigned p = thread_number();
   if (p >= w.pairs) return;
   const auto place = [&](ListKind list) { return w.lists[list].cell + w.lists[list].first[p]; };
@@ -109,7 +117,7 @@ __global__ void __launch_bounds__(kThreads) count_descent(WalkStep w, Descent d)
   if (t > w.targets) return;
   unsigned children = 0;
   unsigned pairs = 0;
-  if (t < w.targets && w.tree.role[w.target[t].cell] == Role::kTrunk) {
+  if (t < w.targets && w.target[t].divides) {
     const Cell& cell = w.tree.cells[w.target[t].cell];
     for (std::int32_t c = 0; c < cell.children; ++c) children += w.tree.cells[cell.first_child + c].is_target ? 1U : 0U;
     pairs = children * (list_begin(w, kWhole, t + 1) - list_begin(w, kWhole, t));
@@ -123,7 +131,9 @@ __global__ void __launch_bounds__(kThreads) descend(WalkStep w, Descent d) {
   const unsigned t = thread_number();
   if (t == 0) d.next_pair_first[d.target_first[w.targets]] = d.pair_first[w.targets];
   if (t >= w.targets || d.target_first[t] == d.target_first[t + 1]) return;
-  const Cell& cell = w.tree.cells[w.target[t].cell];
+  const WalkTarget& target = w.target[t];
+  const Cell& cell = w.tree.cells[target.cell];
+  const bool above_groups = w.tree.role[target.cell] == Role::kTrunk;
   const unsigned begin = list_begin(w, kWhole, t);
   const unsigned end = list_begin(w, kWhole, t + 1);
   unsigned to = d.target_first[t];
@@ -131,7 +141,7 @@ __global__ void __launch_bounds__(kThreads) descend(WalkStep w, Descent d) {
   for (std::int32_t c = cell.first_child; c < cell.first_child + cell.children; ++c) {
     const Cell& child = w.tree.cells[c];
     if (!child.is_target) continue;
-    d.target[to] = {c, begin, end};
+    d.target[to] = {c, above_groups ? c : target.weighed, begin, end, false};
     d.next_pair_first[to] = pair;
     d.far[to] = gravity::shifted(w.far[t], child.centre - cell.centre);
     pair += end - begin;
@@ -142,13 +152,18 @@ __global__ void __launch_bounds__(kThreads) descend(WalkStep w, Descent d) {
 __global__ void __launch_bounds__(kThreads) leaf_sizes(WalkStep w, unsigned leaves, unsigned* leaf_first) {
   const unsigned l = thread_number();
   if (l > leaves) return;
-  leaf_first[l] = l < leaves ? static_cast<unsigned>(w.tree.cells[w.lists[kLeaves].cell[l]].count) : 0U;
+  leaf_first[l] = l < leaves ? static_cast<unsigned>(w.sources.cells[w.lists[kLeaves].cell[l]].count) : 0U;
 }
 
 dim3 threads_for(unsigned items) { return {blocks_for(items, kThreads)}; }
 void launched() { check(cudaGetLastError(), "launch of a kernel of the tree's walk"); }
 
 }  // namespace
+
+void launch_divide(const WalkStep& step, cudaStream_t stream) {
+  BRECCIA_LAUNCH(divide, dim3(blocks_for(step.targets, kThreads / kWarp)), dim3(kThreads), 0, stream, step);
+  launched();
+}
 
 void launch_count_pairs(const WalkStep& step, cudaStream_t stream) {
   BRECCIA_LAUNCH(count_pairs, threads_for(step.pairs + 1), dim3(kThreads), 0, stream, step);

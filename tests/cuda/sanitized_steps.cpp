@@ -1,8 +1,11 @@
 // A few steps of a small scene, a sorting included, through the engine on the emulated device: built with a sanitizer,
 // as racecheck (every lane is a thread to it) or memcheck of every kernel of the step. An argument makes it brief.
+#include <algorithm>
 #include <cstdio>
 #include <vector>
 
+#include "cuda/body_sets.hpp"
+#include "cuda/box_gravity.hpp"
 #include "cuda/cuda_engine.hpp"
 
 namespace {
@@ -30,6 +33,45 @@ ParticleArrays particles(double cell) {
   return p;
 }
 
+// A box with a mesh has a thousand particles; this one has what a sanitizer can bear.
+template <class Real>
+void sum_in_box(const ParticleArrays& all) {
+  const auto n = static_cast<unsigned>(all.size());
+  cudaStream_t stream = nullptr;
+  cuda::check(cudaStreamCreate(&stream), "stream");
+  {
+    std::vector<double> values(4 * all.size());
+    gravity::Box box{all.position[0], all.position[0]};
+    for (std::size_t i = 0; i < n; ++i) {
+      const Vec3d x = all.position[i];
+      for (std::size_t axis = 0; axis < 3; ++axis) values[axis * n + i] = axis == 0 ? x.x : axis == 1 ? x.y : x.z;
+      values[3 * n + i] = all.mass[i];
+      box.low = {std::min(box.low.x, x.x), std::min(box.low.y, x.y), std::min(box.low.z, x.z)};
+      box.high = {std::max(box.high.x, x.x), std::max(box.high.y, x.y), std::max(box.high.z, x.z)};
+    }
+    cuda::DeviceArray<double> bodies(values.size());
+    cuda::DeviceArray<double> acceleration(3 * all.size());
+    bodies.upload(values, stream);
+    acceleration.fill_bytes(0, stream);
+    const double* x = bodies.data();
+    cuda::BodySets sets(stream);
+    sets.divide({{x, x + n, x + 2 * n}, x + 3 * n, n}, {&box, 1});
+    cuda::BoxGravity<Real> gravity(mpi::Comm(MPI_COMM_SELF), stream);
+    gravity::Stats stats;
+    gravity.add_field(sets.sets()[1],
+                      {.box = box,
+                       .cell = 10e3,
+                       .spacing = 5e3,
+                       .split = 0.8,
+                       .cutoff = 4.5,
+                       .softening = 0.0,
+                       .mass_unit = all.mass[0]},
+                      0, n, acceleration.data(), stats);
+    std::printf("%g pairs, %g m/s2\n", stats.pairs, acceleration.download(1, stream)[0]);
+  }
+  cuda::check(cudaStreamDestroy(stream), "stream");
+}
+
 template <class P>
 void run(int sortings) {
   grid::EngineSetup setup;
@@ -39,6 +81,7 @@ void run(int sortings) {
   setup.uniform_gravity = {0.0, 0.0, -1.0};
   setup.numerics.precision = sizeof(typename P::Real) == 8 ? Precision::kDouble : Precision::kMixed;
   const ParticleArrays all = particles(setup.cell);
+  sum_in_box<typename P::Real>(all);
   material::FlawLists flaws;
   for (std::size_t i = 0; i <= all.size(); ++i) flaws.first.push_back(static_cast<std::uint32_t>(2 * i));
   for (std::size_t i = 0; i < all.size(); ++i) flaws.threshold.insert(flaws.threshold.end(), {1e-6F, 1e-3F});

@@ -91,6 +91,8 @@ void run_all() {
   for (std::size_t n = 0; n < streams.size(); ++n) streams[n]->run_until(streams[n]->enqueued);
 }
 
+}  // namespace
+
 // Later, or as a part of the graph that the stream captures.
 void enqueue(cudaStream_t stream, std::function<void()> work) {
   if (stream->capturing != nullptr) {
@@ -102,8 +104,6 @@ void enqueue(cudaStream_t stream, std::function<void()> work) {
   const std::size_t early = early_stream(streams.size());
   if (early < streams.size()) streams[early]->run_until(streams[early]->enqueued);
 }
-
-}  // namespace
 
 std::uint64_t launch_count() { return launches; }
 std::uint64_t synchronisation_count() { return synchronisations; }
@@ -224,6 +224,16 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaM
   if (memory().holds(to, bytes) != to_device || memory().holds(from, bytes) != from_device)
     return cudaErrorInvalidValue;
   breccia::cuda_emulation::enqueue(stream, [=] { std::memcpy(to, from, bytes); });
+  return cudaSuccess;
+}
+cudaError_t cudaMemcpy2DAsync(void* to, std::size_t to_pitch, const void* from, std::size_t from_pitch,
+                              std::size_t width, std::size_t height, cudaMemcpyKind kind, cudaStream_t stream) {
+  if (width > to_pitch || width > from_pitch) return cudaErrorInvalidValue;
+  for (std::size_t row = 0; row < height; ++row) {
+    const cudaError_t status = cudaMemcpyAsync(static_cast<char*>(to) + row * to_pitch,
+                                               static_cast<const char*>(from) + row * from_pitch, width, kind, stream);
+    if (status != cudaSuccess) return status;
+  }
   return cudaSuccess;
 }
 cudaError_t cudaMemsetAsync(void* to, int value, std::size_t bytes, cudaStream_t stream) {

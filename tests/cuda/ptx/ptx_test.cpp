@@ -3,8 +3,8 @@
 
 #include <tuple>
 
-#include "tests/cuda/engine_cases.hpp"
 #include "tests/cuda/faulty_runs.hpp"
+#include "tests/cuda/gravity_cases.hpp"
 #include "tests/cuda/ptx/ptx_machine.hpp"
 
 namespace breccia::cuda {
@@ -49,7 +49,7 @@ void expect_equal_to_host(const Scene& scene, int steps, const material::Runtime
 
 TEST_P(Ptx, CollisionEqualsHostEngine) {
   const Translated translated("production", arch());
-  expect_equal_to_host(small_impact(precision()), steps(100));
+  expect_equal_to_host(small_impact(precision()), steps(60));
 }
 
 TEST_P(Ptx, DebrisEqualsHostEngine) {
@@ -88,6 +88,18 @@ TEST_P(Ptx, BitsAreThoseOfTheHostCompiler) {
       EXPECT_EQ(states[1].columns[c].values, states[0].columns[c].values) << states[0].columns[c].name;
     }
   }
+}
+
+// All kernels of gravity: boxes with meshes, and trees between them and the debris around.
+TEST_P(Ptx, GravityEqualsHost) {
+  const Translated translated("production", arch());
+  const Parameters parameters{.softening = 500.0, .precision = precision()};
+  const Fields direct = evaluate(small_impact(precision()), GravityMethod::kDirect, parameters, self());
+  EXPECT_LE(direct.largest, rounding(precision()));
+  if (std::string_view(arch()) != "sm_90") return;
+  const Fields mesh = evaluate(two_crowds(precision()), GravityMethod::kTreePm, parameters, self());
+  EXPECT_LE(mesh.rms, precision() == Precision::kDouble ? 1e-12 : 3e-6);
+  EXPECT_EQ(mesh.device_stats.boxes, 2);
 }
 
 INSTANTIATE_TEST_SUITE_P(All, Ptx,

@@ -26,6 +26,7 @@ COMPARE = {"eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">=",
 # !(a op b) for operands of which one may be no number.
 UNORDERED = {"equ": "!=", "neu": "==", "ltu": ">=", "leu": ">", "gtu": "<=", "geu": "<"}
 FUNCTIONS = {"min": "least", "max": "greatest", "sqrt": "std::sqrt", "abs": "std::abs", "fma": "std::fma", "rem": "remainder"}
+WHOLE = {"rzi": "std::trunc", "rni": "std::nearbyint", "rmi": "std::floor", "rpi": "std::ceil"}
 BITS = {"brev": "reversed_bits", "clz": "leading_zeros", "popc": "set_bits"}
 
 
@@ -164,6 +165,14 @@ class Kernel:
             raise KeyError(base)
         return self.assign(operands[0], f"flushed({result})" if flushed else result)
 
+    def do_rsqrt(self, mods, operands, _):
+        # A device is right to two units in the last place, here it is to half of one.
+        if mods not in (["approx", "ftz", "f32"], ["approx", "f64"]):
+            raise KeyError(".".join(mods))
+        kind = mods[-1]
+        root = f"{VALUE[kind]}(1) / std::sqrt({self.value(operands[1], kind)})"
+        return self.assign(operands[0], f"flushed({root})" if kind == "f32" else root)
+
     def do_mul(self, mods, operands, _):
         if mods[0] not in ("wide", "hi"):
             return self.arithmetic("mul", mods, operands)
@@ -227,8 +236,9 @@ class Kernel:
         if flush and source == "f32":
             value = f"flushed({value})"
         if source.startswith("f") and not to.startswith("f"):
-            whole = {"rzi": "std::trunc", "rni": "std::nearbyint", "rmi": "std::floor", "rpi": "std::ceil"}[rounding[0]]
-            return self.assign(operands[0], f"saturated<{VALUE[to]}>({whole}({value}))")
+            return self.assign(operands[0], f"saturated<{VALUE[to]}>({WHOLE[rounding[0]]}({value}))")
+        if to == source and rounding and rounding[0] in WHOLE:
+            return self.assign(operands[0], f"{WHOLE[rounding[0]]}({value})")
         if rounding not in ([], ["rn"]):
             raise KeyError(".".join(mods))
         result = f"static_cast<{VALUE[to]}>({value})"

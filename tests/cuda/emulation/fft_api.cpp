@@ -1,0 +1,113 @@
+#include "tests/cuda/emulation/fft_api.hpp"
+
+#include <fftw3.h>
+
+#include <functional>
+#include <map>
+#include <vector>
+
+namespace breccia::cuda_emulation {
+
+void enqueue(cudaStream_t stream, std::function<void()> work);
+
+namespace {
+
+// What cufftPlanMany() was told. FFTW plans for the arrays at hand, when the work is done: it takes their alignment.
+struct Plan {
+  std::vector<int> lengths, in_extents, out_extents;
+  int in_stride, in_distance, out_stride, out_distance, count;
+  cufftType type;
+  cudaStream_t stream = nullptr;
+};
+
+std::map<cufftHandle, Plan>& plans() {
+  static std::map<cufftHandle, Plan> all;
+  return all;
+}
+
+// Runs make(plan) as late as the stream allows, and the transform that it plans.
+template <class Make, class Run, class Destroy>
+cufftResult enqueue_transform(cufftHandle handle, cufftType type, Make make, Run run, Destroy destroy) {
+  const auto found = plans().find(handle);
+  if (found == plans().end() || found->second.type != type || found->second.stream == nullptr)
+    return CUFFT_INVALID_PLAN;
+  enqueue(found->second.stream, [p = found->second, make, run, destroy] {
+    const auto plan = make(p);
+    run(plan);
+    destroy(plan);
+  });
+  return CUFFT_SUCCESS;
+}
+
+}  // namespace
+}  // namespace breccia::cuda_emulation
+
+using breccia::cuda_emulation::enqueue_transform;
+using breccia::cuda_emulation::Plan;
+using breccia::cuda_emulation::plans;
+
+// NOLINTBEGIN(readability-identifier-naming)
+cufftResult cufftPlanMany(cufftHandle* plan, int rank, int* lengths, int* in_extents, int in_stride, int in_distance,
+                          int* out_extents, int out_stride, int out_distance, cufftType type, int count) {
+  static cufftHandle last = 0;
+  if (rank < 1 || rank > 3 || count < 1) return CUFFT_INVALID_VALUE;
+  *plan = ++last;
+  plans()[last] = {{lengths, lengths + rank},
+                   {in_extents, in_extents + rank},
+                   {out_extents, out_extents + rank},
+                   in_stride,
+                   in_distance,
+                   out_stride,
+                   out_distance,
+                   count,
+                   type};
+  return CUFFT_SUCCESS;
+}
+
+cufftResult cufftSetStream(cufftHandle plan, cudaStream_t stream) {
+  const auto found = plans().find(plan);
+  if (found == plans().end()) return CUFFT_INVALID_PLAN;
+  found->second.stream = stream;
+  return CUFFT_SUCCESS;
+}
+
+cufftResult cufftDestroy(cufftHandle plan) { return plans().erase(plan) == 1 ? CUFFT_SUCCESS : CUFFT_INVALID_PLAN; }
+
+// FFTW takes the arguments of cufftPlanMany() in the same order, with the arrays between them.
+#define BRECCIA_EMULATED_FFT(fftw, Real, Complex, between, from_real, to_real, ExecBetween, ExecFromReal, ExecToReal) \
+  cufftResult ExecBetween(cufftHandle plan, Complex* in, Complex* out, int direction) {                               \
+    return enqueue_transform(                                                                                         \
+        plan, between,                                                                                                \
+        [=](const Plan& p) {                                                                                          \
+          return fftw##_plan_many_dft(static_cast<int>(p.lengths.size()), p.lengths.data(), p.count, in,              \
+                                      p.in_extents.data(), p.in_stride, p.in_distance, out, p.out_extents.data(),     \
+                                      p.out_stride, p.out_distance, direction, FFTW_ESTIMATE);                        \
+        },                                                                                                            \
+        fftw##_execute, fftw##_destroy_plan);                                                                         \
+  }                                                                                                                   \
+  cufftResult ExecFromReal(cufftHandle plan, Real* in, Complex* out) {                                                \
+    return enqueue_transform(                                                                                         \
+        plan, from_real,                                                                                              \
+        [=](const Plan& p) {                                                                                          \
+          return fftw##_plan_many_dft_r2c(static_cast<int>(p.lengths.size()), p.lengths.data(), p.count, in,          \
+                                          p.in_extents.data(), p.in_stride, p.in_distance, out, p.out_extents.data(), \
+                                          p.out_stride, p.out_distance, FFTW_ESTIMATE);                               \
+        },                                                                                                            \
+        fftw##_execute, fftw##_destroy_plan);                                                                         \
+  }                                                                                                                   \
+  cufftResult ExecToReal(cufftHandle plan, Complex* in, Real* out) {                                                  \
+    return enqueue_transform(                                                                                         \
+        plan, to_real,                                                                                                \
+        [=](const Plan& p) {                                                                                          \
+          return fftw##_plan_many_dft_c2r(static_cast<int>(p.lengths.size()), p.lengths.data(), p.count, in,          \
+                                          p.in_extents.data(), p.in_stride, p.in_distance, out, p.out_extents.data(), \
+                                          p.out_stride, p.out_distance, FFTW_ESTIMATE);                               \
+        },                                                                                                            \
+        fftw##_execute, fftw##_destroy_plan);                                                                         \
+  }
+BRECCIA_EMULATED_FFT(fftwf, float, cufftComplex, CUFFT_C2C, CUFFT_R2C, CUFFT_C2R, cufftExecC2C, cufftExecR2C,
+                     cufftExecC2R)
+BRECCIA_EMULATED_FFT(fftw, double, cufftDoubleComplex, CUFFT_Z2Z, CUFFT_D2Z, CUFFT_Z2D, cufftExecZ2Z, cufftExecD2Z,
+                     cufftExecZ2D)
+#undef BRECCIA_EMULATED_FFT
+// NOLINTEND(readability-identifier-naming)

@@ -1,0 +1,129 @@
+// Fields of gravity on the emulated device and the host's for the same particles.
+#pragma once
+
+#include <cstring>
+
+#include "gravity/resident.hpp"
+#include "grid/state_columns.hpp"
+#include "tests/cuda/engine_cases.hpp"
+
+namespace breccia::cuda {
+
+using gravity::Parameters;
+
+// A column of a saved state.
+template <class T>
+std::vector<T> column(const EngineState& state, const char* field, std::size_t components) {
+  const StateColumn& c = grid::find_column(state, field, sizeof(T), components);
+  std::vector<T> values(state.particles * components);
+  if (!values.empty()) std::memcpy(values.data(), c.values.data(), c.values.size());
+  return values;
+}
+
+// The accelerations that the particles of this rank hold.
+inline std::vector<Vec3d> held(const Engine& engine, Precision precision) {
+  const EngineState state = engine.save();
+  std::vector<Vec3d> a(state.particles);
+  const auto read = [&](auto zero) {
+    const auto values = column<decltype(zero)>(state, "gravity", 3);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      a[i] = {static_cast<double>(values[3 * i]), static_cast<double>(values[3 * i + 1]),
+              static_cast<double>(values[3 * i + 2])};
+    }
+  };
+  precision == Precision::kDouble ? read(0.0) : read(0.0F);
+  return a;
+}
+inline std::vector<std::int32_t> ids(const Engine& engine) { return column<std::int32_t>(engine.save(), "id_low", 1); }
+
+inline std::unique_ptr<Engine> loaded(const Scene& scene, const mpi::Comm& comm) {
+  EngineSetup setup = setup_for(scene);
+  setup.self_gravity = true;
+  auto engine = make_cuda_engine(setup, comm);
+  fill(*engine, scene, comm);
+  return engine;
+}
+
+// A field on the devices of all ranks, and the same from the host's solver on one rank for the same predicted
+// positions.
+struct Fields {
+  gravity::Stats device_stats, host_stats;
+  double rms = 0.0;      // of |difference| / |a|
+  double largest = 0.0;  // |difference| over the largest |a|
+};
+inline Fields evaluate(const Scene& scene, GravityMethod method, const Parameters& parameters, const mpi::Comm& comm) {
+  constexpr double ahead = 20.0;
+  const auto engine = loaded(scene, comm);
+  const auto resident = dynamic_cast<gravity::ResidentParticles&>(*engine).make_resident_solver(method, parameters);
+  if (!resident) throw UsageError("the device has not this method");
+  resident->evaluate_and_hold(ahead);
+
+  const auto all = loaded(scene, self());
+  std::vector<Vec3d> position;
+  std::vector<double> mass;
+  all->predict(ahead, position, mass);
+  std::vector<Vec3d> expected(position.size());
+  const auto solver = gravity::make_solver(method, parameters, self(), 1);
+  solver->evaluate({position, mass}, expected, {});
+  std::vector<Vec3d> by_id(position.size());
+  const std::vector<std::int32_t> id = ids(*all);
+  for (std::size_t i = 0; i < id.size(); ++i) by_id[static_cast<std::size_t>(id[i])] = expected[i];
+
+  Fields fields{resident->last(), solver->last()};
+  const std::vector<Vec3d> found = held(*engine, scene.numerics.precision);
+  const std::vector<std::int32_t> found_id = ids(*engine);
+  double squares = 0.0, largest_field = 0.0;
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const Vec3d a = by_id[static_cast<std::size_t>(found_id[i])];
+    const Vec3d d = found[i] - a;
+    squares += dot(d, d) / dot(a, a);
+    fields.largest = std::max(fields.largest, std::sqrt(dot(d, d)));
+    largest_field = std::max(largest_field, std::sqrt(dot(a, a)));
+  }
+  EXPECT_EQ(comm.sum(static_cast<std::uint64_t>(found.size())), position.size());
+  fields.rms = std::sqrt(comm.sum(squares) / static_cast<double>(position.size()));
+  fields.largest = comm.max(fields.largest) / comm.max(largest_field);
+  EXPECT_TRUE(std::isfinite(fields.rms)) << "a largest value does not show what is no number";
+  return fields;
+}
+
+// Sums of 500 terms in another order: their roundings, 1e-16 and 6e-8, as a random walk, twice over.
+inline double rounding(Precision precision) { return precision == Precision::kDouble ? 1e-14 : 3e-6; }
+
+inline void number(Scene& scene) {
+  std::uint64_t id = 0;
+  for (BodyParameters& body : scene.bodies) {
+    body.first_id = id;
+    id += body.particles;
+  }
+}
+
+// Two bodies: cells of all sizes, and targets of all kinds.
+inline Scene bodies(Precision precision) {
+  Scene scene = small_impact(precision);
+  for (BodyParameters& body : scene.bodies) body.particles = 1200;
+  number(scene);
+  return scene;
+}
+
+// The same with ejecta far around them.
+inline Scene crowd(Precision precision) {
+  Scene scene = bodies(precision);
+  scene.bodies.push_back(scene.bodies[0]);
+  BodyParameters& ejecta = scene.bodies.back();
+  ejecta.lattice = Lattice::kRandom;
+  ejecta.particles = 700;
+  ejecta.semi_axes = {900e3, 300e3, 300e3};
+  ejecta.mass *= 0.1;
+  number(scene);
+  return scene;
+}
+
+// Bodies too far from each other for one mesh over both.
+inline Scene two_crowds(Precision precision) {
+  Scene scene = crowd(precision);
+  scene.bodies[1].position.x = -500e3;
+  return scene;
+}
+
+}  // namespace breccia::cuda
