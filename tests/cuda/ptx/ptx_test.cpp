@@ -1,6 +1,7 @@
 // The code that nvcc emits, executed: the engine on the emulated device, every kernel of it translated from PTX.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <tuple>
 
 #include "tests/cuda/faulty_runs.hpp"
@@ -47,9 +48,10 @@ void expect_equal_to_host(const Scene& scene, int steps, const material::Runtime
   EXPECT_EQ(device->finish_damage(), host->finish_damage());
 }
 
+// In fewer than twenty steps there is so little strain that its rounding shows.
 TEST_P(Ptx, CollisionEqualsHostEngine) {
   const Translated translated("production", arch());
-  expect_equal_to_host(small_impact(precision()), steps(60));
+  expect_equal_to_host(small_impact(precision()), std::max(steps(60), 20));
 }
 
 TEST_P(Ptx, DebrisEqualsHostEngine) {
