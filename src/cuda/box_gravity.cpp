@@ -36,9 +36,7 @@ void BoxGravity<Real>::add_field(const BodyArrays& all, const gravity::BoxSettin
                                  unsigned own, double* acceleration, gravity::Stats& stats) {
   const gravity::MeshGeometry geometry(settings.box, settings.cell);
   nodes_ = nodes_of(geometry, settings.spacing);
-  stats.phases.time(Phase::kTransform, [&] {
-    prepare_mesh(geometry.size, settings.split);
-  });
+  stats.phases.time(Phase::kTransform, [&] { prepare_mesh(geometry.size, settings.split); });
   stats.phases.time(Phase::kSort, [&] { sort(all, settings, first, own); });
   const double unit = kGravitationalConstant * settings.mass_unit / (settings.cell * settings.cell);
   add_mesh_field(unit, own, acceleration, stats.phases);

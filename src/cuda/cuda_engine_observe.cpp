@@ -175,6 +175,7 @@ grid::EngineStats CudaEngine<P>::stats() const {
   stats.particles = particles_.count();
   stats.lone_particles = grid_.lone_particles();
   stats.tiles = grid_.tiles();
+  stats.occupied_blocks = grid_.tiles();
   stats.blocks = grid_.blocks();
   stats.halo_bytes_per_step = halo_.bytes();
   stats.particle_bytes = particles_.bytes() + flaw_thresholds_.bytes();

@@ -26,7 +26,7 @@ void CudaEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
   host->insert(particles, flaws, spin_of_body);
   const grid::EngineStats held = host->stats();
   require_memory({.particles = held.particles,
-                  .tiles = held.tiles,
+                  .tiles = held.occupied_blocks,
                   .blocks = held.blocks,
                   .flaws = host->flaws().threshold.size()});
   restore(host->save(), host->flaws());

@@ -79,7 +79,8 @@ struct EngineStats {
   std::uint64_t particles = 0;
   std::uint64_t lone_particles = 0;  ///< that use no grid
   std::uint64_t tiles = 0;
-  std::uint64_t packs = 0;  ///< SIMD packs in tiles; 0 on a device
+  std::uint64_t occupied_blocks = 0;  ///< that hold particles which use the grid
+  std::uint64_t packs = 0;            ///< SIMD packs in tiles; 0 on a device
   std::uint64_t blocks = 0;
   std::uint64_t halo_bytes_per_step = 0;
   std::uint64_t key_exchanges = 0;  ///< sortings after which ranks had to agree on shared blocks anew

@@ -131,8 +131,6 @@ class HostEngine final : public Engine {
   static constexpr std::uint32_t kAllPlanes = 0b1111;
   [[nodiscard]] std::size_t plane_in_stack(std::size_t slot) const;  // of a particle's node, just after a sorting
   [[nodiscard]] std::int32_t planes_kept_together(int axis) const;   // no cut runs between them
-  // Ordered sums are those of whole tiles.
-  [[nodiscard]] bool divides_blocks() const { return setup_.divide_blocks && !setup_.numerics.reproducible; }
 
   // Calls visit(slot, stack) for every particle, in storage order; its node is relative to that block.
   template <class F>
@@ -167,7 +165,8 @@ class HostEngine final : public Engine {
   ParticleStore<P> store_;
   std::vector<float> flaw_thresholds_;
   std::vector<Tile> tiles_;
-  std::vector<BlockKey> stacks_;              // lowest block of each tile
+  std::vector<BlockKey> stacks_;               // lowest block of each tile
+  std::size_t occupied_blocks_ = 0;            // of the tiles
   std::vector<OccupiedCells> occupied_cells_;  // of each tile at the last sorting
   std::vector<TileBox> boxes_;
   Sweep sweep_;

@@ -15,8 +15,8 @@ std::vector<char> HostEngine<P>::find_lone(Occupancy& occupancy) const {
   if (others_tell) tell_neighbours(occupancy);
   std::vector<char> lone(own);
   for (std::uint32_t b = 0; b < own; ++b) {
-    lone[b] = occupancy.is_alone(
-        b, periodicity_, [&](BlockCoord there) { return others_tell || own_planes(there) == kAllPlanes; });
+    lone[b] = occupancy.is_alone(b, periodicity_,
+                                 [&](BlockCoord there) { return others_tell || own_planes(there) == kAllPlanes; });
   }
   return lone;
 }

@@ -158,6 +158,7 @@ EngineStats HostEngine<P>::stats() const {
   stats.particles += lone_.particles;
   stats.lone_particles = lone_.particles;
   stats.tiles = tiles_.size();
+  stats.occupied_blocks = occupied_blocks_;
   stats.packs = lone_.first_pack;
   stats.blocks = owned_blocks_;
   stats.halo_bytes_per_step = sum_exchange_.bytes() + velocity_exchange_.bytes();

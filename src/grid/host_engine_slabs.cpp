@@ -27,9 +27,7 @@ template <class P>
 void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
   std::array<mpi::PlaneWork, 3> mine;
   for (const Placement& p : placements) {
-    for (int axis = 0; axis < 3; ++axis) {
-      ++mine[static_cast<std::size_t>(axis)].nodes[p.node[axis] & -planes_kept_together(axis)];
-    }
+    for (std::size_t axis = 0; axis < 3; ++axis) ++mine[axis].nodes[p.node[axis]];
   }
   // Slabs across the longest extent of the matter share the fewest nodes.
   std::array<mpi::PlaneWork, 3> all;
@@ -39,7 +37,11 @@ void HostEngine<P>::choose_slabs(std::span<const Placement> placements) {
     if (mpi::extent(all[axis]) > mpi::extent(all[longest])) longest = axis;
   }
   const int axis = setup_.slab_axis.value_or(static_cast<int>(longest));
-  slabs_ = mpi::Slabs::balanced(axis, all[static_cast<std::size_t>(axis)], comm_.size());
+  mpi::PlaneWork work;
+  for (const auto& [plane, particles] : all[static_cast<std::size_t>(axis)].nodes) {
+    work.nodes[plane & -planes_kept_together(axis)] += particles;
+  }
+  slabs_ = mpi::Slabs::balanced(axis, work, comm_.size());
 }
 
 template <class P>
@@ -76,8 +78,9 @@ mpi::PlaneWork HostEngine<P>::work(std::span<const double> more) const {
 
 template <class P>
 std::int32_t HostEngine<P>::planes_kept_together(int axis) const {
-  if (divides_blocks()) return 1;
-  return axis == 2 ? kStackHeight : kBlockWidth;
+  // Ordered sums are those of whole tiles.
+  if (setup_.numerics.reproducible) return axis == 2 ? kStackHeight : kBlockWidth;
+  return setup_.divide_blocks ? 1 : kBlockWidth;
 }
 
 template <class P>

@@ -28,6 +28,8 @@ struct CellInStack {
   }
 };
 
+constexpr std::uint32_t kNoTile = kNoBlock;
+
 using mpi::get;
 using mpi::put;
 
@@ -128,6 +130,7 @@ std::vector<std::uint32_t> HostEngine<P>::find_tiles(const Occupancy& occupancy,
     const BlockKey block = occupancy.blocks()[b].block;
     if (lone[b] == 0) members.push_back({block_key(stack_of(block_coord(block))), b});
   }
+  occupied_blocks_ = members.size();
   std::ranges::sort(members, {}, &Member::stack);
   std::vector<std::uint32_t> tile_of_block(lone.size(), kNoTile);
   stacks_.clear();

@@ -15,8 +15,7 @@ void HostEngine<P>::run_task(const SweepTask& task, const PassArguments<P>& argu
     for (std::uint32_t n = step.first; n < step.last; ++n) {
       if (!step.update) {
         const std::uint32_t tile = sweep_.order[n];
-        const std::uint32_t next = n + 1 < step.last ? sweep_.order[n + 1] : kNoTile;
-        kernels_.pass(arguments, tile, next, reports[tile]);
+        kernels_.pass(arguments, tile, reports[tile]);
         if (n % kStretch == 0) progress(trailing);
       } else if (trailing != nullptr) {
         update_stack(tiles_[n], *trailing);

@@ -30,9 +30,9 @@ BRECCIA_HD void specialised(const material::RuntimeEffects& fx, F&& run) {
 }
 
 template <class P>
-void pass(const PassArguments<P>& a, std::uint32_t tile, std::uint32_t next, TileReport& report) {
+void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
   specialised(a.effects,
-              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, scratch<P>(), tile, next, report); });
+              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, scratch<P>(), tile, report); });
 }
 
 template <class P>
@@ -99,8 +99,7 @@ BRECCIA_HD void update_nodes_at(const NodeArguments<P>& a, std::size_t first) {
     const Real mass = sums[kMass];
     const N values = N::load(sums);
     N(Real(0)).store(sums);
-    const N moving =
-        mass > a.smallest_mass ? node_velocities(values, N(Real(1) / mass), a.kick) : N(Real(0));
+    const N moving = mass > a.smallest_mass ? node_velocities(values, N(Real(1) / mass), a.kick) : N(Real(0));
     moving.store(velocities);
   }
 }

@@ -40,7 +40,8 @@ struct ContributionMessages {
 class OrderedSums {
  public:
   /// Gives tiles that reach blocks of other ranks, shared or collected blocks blocks of their own to add to, stored
-  /// behind those of `blocks`. `stacks`: their lowest blocks; `owner(block)` is a rank; `period` as in sweep_plan.hpp. Collective.
+  /// behind those of `blocks`. `stacks`: their lowest blocks; `owner(block)` is a rank; `period` as in sweep_plan.hpp.
+  /// Collective.
   template <class Owner>
   ContributionMessages connect(std::span<const Tile> tiles, std::span<const BlockKey> stacks, const BlockTable& blocks,
                                std::span<const BlockSums> owned, std::int32_t period, Owner&& owner,

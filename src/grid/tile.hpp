@@ -67,8 +67,6 @@ enum VelocityChannel { kNewVelocity = 0, kOldVelocity = 3 };  // kMass stays whe
 template <class P>
 using Node = Pack<typename P::Real, kChannels>;
 
-inline constexpr std::uint32_t kNoTile = 0xffffffffU;
-
 struct Tile {
   std::uint32_t first_pack = 0;
   std::uint32_t particles = 0;
@@ -199,8 +197,7 @@ struct NodeArguments {
 /// The entry points one instruction set provides.
 template <class P>
 struct Kernels {
-  /// `next`: the tile after it, whose nodes are asked for ahead, or kNoTile.
-  void (*pass)(const PassArguments<P>&, std::uint32_t tile, std::uint32_t next, TileReport&);
+  void (*pass)(const PassArguments<P>&, std::uint32_t tile, TileReport&);
   void (*probe)(const ProbeArguments<P>&, std::uint32_t tile);
   /// The same for the lone packs first .. last-1, counted from 0.
   void (*lone_pass)(const PassArguments<P>&, std::uint32_t first, std::uint32_t last, TileReport&);

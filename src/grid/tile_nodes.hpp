@@ -37,7 +37,8 @@ BRECCIA_HD void for_each_column(const Tile& tile, const TileBox& box, F&& visit)
       const int y = box.low[1] > kFirst[by] ? box.low[1] : kFirst[by];
       const int rows_y = (box.high[1] < kLast[by] ? box.high[1] : kLast[by]) - y + 1;
       const int row = (x - kFirst[bx] + kStart[bx]) * kBlockWidth + (y - kFirst[by] + kStart[by]);
-      visit(Column{tile.neighbours + (bx * 3 + by) * kNeighboursAlongZ, row * kBlockWidth, tile_index(x, y, 0), rows_x, rows_y});
+      visit(Column{tile.neighbours + (bx * 3 + by) * kNeighboursAlongZ, row * kBlockWidth, tile_index(x, y, 0), rows_x,
+                   rows_y});
     }
   }
 }
@@ -127,60 +128,6 @@ template <class P>
   for (int n = 0; lost && n < kBlockNodes * kChannels; ++n) beyond[n] = typename P::Real(0);
   return lost;
 }
-
-/// Asks for the nodes of a tile ahead of their use, a few rows at a time: all at once would fill the buffers that wait
-/// for memory.
-template <class P>
-class TilePrefetch {
- public:
-  /// Null tile: nothing.
-  BRECCIA_HD TilePrefetch(const Tile* tile, const TileBox* box, const typename P::Real* velocities,
-                          const typename P::Real* sums)
-      : tile_(tile), velocities_(velocities), sums_(sums) {
-    if (tile == nullptr) return;
-    box_ = *box;
-    // The nearer half along y is still there from the tiles before.
-    if (box_.low[1] < kTileWidth / 2) box_.low[1] = kTileWidth / 2;
-    x_ = box_.low[0];
-    y_ = box_.low[1];
-    const int along_y = box_.high[1] - box_.low[1] + 1;
-    left_ = along_y > 0 ? (box_.high[0] - box_.low[0] + 1) * along_y : 0;
-  }
-
-  BRECCIA_HD void rows(int count) {
-    for (; count > 0 && left_ > 0; --count, --left_) {
-      row();
-      if (++y_ > box_.high[1]) {
-        y_ = box_.low[1];
-        ++x_;
-      }
-    }
-  }
-
- private:
-  BRECCIA_HD void row() const {
-    constexpr int kShift = kBlockWidth - kTileMargin;
-    const int x = x_ + kShift;
-    const int y = y_ + kShift;
-    const std::uint32_t* blocks = tile_->neighbours + (x / kBlockWidth * 3 + y / kBlockWidth) * kNeighboursAlongZ;
-    const int node = (x % kBlockWidth * kBlockWidth + y % kBlockWidth) * kBlockWidth;
-    for (int p = box_.low[2] / 2; p <= box_.high[2] / 2; ++p) {
-      const std::uint32_t block = blocks[detail::pair_block(p)];
-      if (block == kNoBlock) continue;
-      const std::size_t first = detail::at(block, node + detail::pair_start(p));
-      __builtin_prefetch(velocities_ + first, 0, 2);
-      __builtin_prefetch(sums_ + first, 1, 2);
-    }
-  }
-
-  const Tile* tile_;
-  const typename P::Real* velocities_;
-  const typename P::Real* sums_;
-  TileBox box_{};
-  int x_ = 0;
-  int y_ = 0;
-  int left_ = 0;
-};
 
 /// Marks the rows of the blocks that a box reaches.
 BRECCIA_HD void mark_rows(const Tile& tile, const TileBox& box, RowMask* rows) {

@@ -82,15 +82,12 @@ class TileGrid {
 
 template <class P, class Fx>
 BRECCIA_HD void pass_over_tile(const PassArguments<P>& a, const Fx& fx, TileScratch<P>& scratch, std::uint32_t index,
-                               std::uint32_t next, TileReport& report) {
+                               TileReport& report) {
   TileGrid<P> grid(a, scratch);
   grid.load(index);
   PackPass<P, Fx, TileGrid<P>> packs(a, fx, grid);
   const Tile& tile = a.tiles[index];
-  const bool follows = next != kNoTile && a.gather;
-  TilePrefetch<P> ahead(follows ? a.tiles + next : nullptr, a.boxes + next, a.velocities, a.sums);
   for (int done = 0; done < static_cast<int>(tile.particles); done += P::kLanes) {
-    ahead.rows(1);
     const int left = static_cast<int>(tile.particles) - done;
     const int pack = done / P::kLanes;
     packs.run(tile.first_pack + static_cast<std::size_t>(pack), left < P::kLanes ? left : P::kLanes, report);

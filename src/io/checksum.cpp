@@ -4,6 +4,7 @@
 #include <zlib.h>
 
 #include <array>
+#include <cerrno>
 #include <cstring>
 #include <fstream>
 #include <vector>
@@ -87,7 +88,7 @@ void append_checksum(const std::filesystem::path& path, const mpi::Comm& comm) {
     std::ofstream file(path, std::ios::binary | std::ios::app);
     file.write(reinterpret_cast<const char*>(&trailer), sizeof trailer);
     file.close();
-    if (!file) throw IoError(fmt::format("{}: cannot write its checksum", path.string()));
+    if (!file) throw IoError(fmt::format("{}: cannot write its checksum: {}", path.string(), std::strerror(errno)));
   });
 }
 

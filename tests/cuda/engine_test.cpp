@@ -68,7 +68,7 @@ TEST_P(CudaEngineTest, WorkAndCountsEqualHostEngine) {
   EXPECT_NEAR(device.viscous_work, host.viscous_work, 10 * tolerance * host.viscous_work);
   EXPECT_NEAR(device.largest_move, host.largest_move, tolerance * host.largest_move);
   EXPECT_NEAR(pair.device->elastic_energy(), pair.host->elastic_energy(), tolerance * pair.host->elastic_energy());
-  EXPECT_EQ(pair.device->stats().tiles, pair.host->stats().tiles);
+  EXPECT_EQ(pair.device->stats().occupied_blocks, pair.host->stats().occupied_blocks);
   EXPECT_EQ(pair.device->stats().blocks, pair.host->stats().blocks);
 }
 
@@ -265,7 +265,7 @@ TEST_P(CudaEngineTest, MemoryIsKnownBefore) {
     const auto host = grid::make_host_engine(setup, self());
     fill(*host, scene);
     const grid::EngineStats held = host->stats();
-    const Load load{held.particles, held.tiles, held.blocks, host->flaws().threshold.size()};
+    const Load load{held.particles, held.occupied_blocks, held.blocks, host->flaws().threshold.size()};
     const std::uint64_t needed =
         GetParam() == Precision::kDouble
             ? bytes_needed<DoublePrecision>(DeviceParticles<DoublePrecision>(grid::groups_for(setup)).record_bytes(),

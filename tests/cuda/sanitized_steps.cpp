@@ -58,15 +58,10 @@ void sum_in_box(const ParticleArrays& all) {
     sets.divide({{x, x + n, x + 2 * n}, x + 3 * n, n}, {&box, 1});
     cuda::BoxGravity<Real> gravity(mpi::Comm(MPI_COMM_SELF), stream);
     gravity::Stats stats;
-    gravity.add_field(sets.sets()[1],
-                      {.box = box,
-                       .cell = 10e3,
-                       .spacing = 5e3,
-                       .split = 0.8,
-                       .cutoff = 4.5,
-                       .softening = 0.0,
-                       .mass_unit = all.mass[0]},
-                      0, n, acceleration.data(), stats);
+    gravity.add_field(
+        sets.sets()[1],
+        {.box = box, .cell = 10e3, .spacing = 5e3, .split = {.scale = 0.8, .cutoff = 3.6}, .mass_unit = all.mass[0]}, 0,
+        n, acceleration.data(), stats);
     std::printf("%g pairs, %g m/s2\n", stats.pairs, acceleration.download(1, stream)[0]);
   }
   cuda::check(cudaStreamDestroy(stream), "stream");

@@ -89,7 +89,8 @@ LawErrors inside_a_box(double split, double cutoff) {
     }
     Stats stats;
     const std::vector<std::uint8_t> set(p.position.size(), 1);
-    mesh.add_to({p.position, p.mass}, set, 1, {box, kCell, kCell, split, cutoff, kSoftening, kMass}, p.field(), stats);
+    mesh.add_to({p.position, p.mass}, set, 1, {box, kCell, kCell, {split, split * cutoff, kSoftening / kCell}, kMass},
+                p.field(), stats);
     errors.add(p.position, p.acceleration, p.potential);
     // The mass itself feels nothing and has no potential of its own, but for the mesh's error at its place.
     const double unit_field = kGravitationalConstant * kMass / (kCell * kCell);
