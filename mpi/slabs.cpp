@@ -10,7 +10,7 @@ namespace breccia::mpi {
 namespace {
 
 // Past every plane, and where a block begins.
-constexpr std::int32_t kNoPlane = std::numeric_limits<std::int32_t>::max() / kPlanesOfBlock * kPlanesOfBlock;
+constexpr std::int32_t kNoPlane = std::numeric_limits<std::int32_t>::max() / 64 * 64;
 
 // Planes of nodes in their order with the work before each: a slab is a range of indices. Its work grows with it at
 // either end, by more than the plane's own where a block begins.

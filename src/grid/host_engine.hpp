@@ -18,6 +18,7 @@ namespace breccia::grid {
 /// Which cells along each axis hold particles of a tile: bit n for cell n of its stack.
 struct OccupiedCells {
   std::uint16_t axis[3] = {0, 0, 0};
+  static_assert(kStackHeight <= 16);
 };
 
 /// Nodes of a block that a rank asks their owner for: bit n for the plane n across the slabs.
@@ -52,7 +53,7 @@ class HostEngine final : public Engine {
   void kick_velocities(double time) override;
   [[nodiscard]] ParticleOutput observe() const override;
   [[nodiscard]] ParticleOutput inspect() const override;
-  [[nodiscard]] bool strayed() const override { return strayed_packs_ != 0 || lone_strayed(); }
+  [[nodiscard]] bool strayed() const override { return strayed_packs_ != 0 || boundary_strayed() || lone_strayed(); }
   [[nodiscard]] std::optional<ParticleSample> fastest() const override;
   [[nodiscard]] std::vector<double> volume_ratios() const override;
   [[nodiscard]] double elastic_energy() const override;
@@ -101,7 +102,10 @@ class HostEngine final : public Engine {
   void migrate(std::vector<Placement>& placements);
   [[nodiscard]] std::vector<char> find_lone(Occupancy& occupancy) const;  // for each block of it
   void tell_neighbours(Occupancy& occupancy) const;                       // of what this rank's blocks hold
-  [[nodiscard]] bool lone_strayed() const;                                // more than a node since the last sorting
+  // By more than a node since the last sorting: other ranks know of no node that far.
+  [[nodiscard]] bool boundary_strayed() const;
+  [[nodiscard]] bool has_drifted(std::size_t slot, std::int32_t sorted_node) const;
+  [[nodiscard]] bool lone_strayed() const;  // more than a node since the last sorting
   void arrange(std::span<const Placement> placements);
   [[nodiscard]] std::vector<std::uint32_t> find_tiles(const Occupancy& occupancy, std::span<const char> lone);
   void connect_tiles();
@@ -179,9 +183,10 @@ class HostEngine final : public Engine {
   LargeArray<Real> sums_;
   LargeArray<Real> velocities_;
   std::vector<RowMask> rows_;
-  std::vector<BlockSums> block_sums_;  // by owned block
-  std::vector<char> is_boundary_;      // by tile: it reaches shared blocks or those of other ranks
-  double trailing_kick_ = 0.0;         // of the rows already updated by the last pass; 0: none
+  std::vector<BlockSums> block_sums_;        // by owned block
+  std::vector<std::int32_t> boundary_node_;  // packed, of the particles of boundary tiles at the last sorting
+  std::vector<char> is_boundary_;            // by tile: it reaches shared blocks or those of other ranks
+  double trailing_kick_ = 0.0;               // of the rows already updated by the last pass; 0: none
   std::size_t owned_blocks_ = 0;
   double smallest_mass_ = 0.0;
   std::uint64_t strayed_packs_ = 0;  // seen since the last sorting; reported there, on all ranks at once

@@ -172,6 +172,7 @@ template <class P>
 void HostEngine<P>::connect_halo() {
   block_sums_.assign(owned_blocks_, BlockSums::kInPlace);
   is_boundary_.assign(tiles_.size(), 0);
+  boundary_node_.clear();
   if (comm_.size() == 1) return;
   for (const auto* of_all : {&block_requests_.by_rank(), &block_requests_.of_rank()}) {
     for (const std::vector<BlockRequest>& requests : *of_all) {
@@ -184,6 +185,12 @@ void HostEngine<P>::connect_halo() {
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     for (const std::uint32_t b : tiles_[t].neighbours) {
       if (b != kNoBlock && (b >= owned_blocks_ || block_sums_[b] == BlockSums::kShared)) is_boundary_[t] = 1;
+    }
+  }
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    for (std::uint32_t n = 0; is_boundary_[t] != 0 && n < tiles_[t].particles; ++n) {
+      const std::size_t slot = tiles_[t].first_pack * kLanes + n;
+      boundary_node_.push_back(store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)]);
     }
   }
   auto touched = nodes_of(block_requests_.of_rank());

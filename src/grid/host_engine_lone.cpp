@@ -39,13 +39,30 @@ void HostEngine<P>::tell_neighbours(Occupancy& occupancy) const {
 }
 
 template <class P>
+bool HostEngine<P>::has_drifted(std::size_t slot, std::int32_t sorted_node) const {
+  const std::int32_t now = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
+  for (int axis = 0; axis < 3; ++axis) {
+    const int drift = ((now >> (8 * axis)) & 255) - ((sorted_node >> (8 * axis)) & 255);
+    if (std::abs(drift) > 1) return true;
+  }
+  return false;
+}
+
+template <class P>
 bool HostEngine<P>::lone_strayed() const {
   for (std::uint32_t n = 0; n < lone_.particles; ++n) {
-    const std::size_t slot = lone_.first_pack * kLanes + n;
-    const std::int32_t now = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
-    for (int axis = 0; axis < 3; ++axis) {
-      const int drift = ((now >> (8 * axis)) & 255) - ((lone_node_[n] >> (8 * axis)) & 255);
-      if (std::abs(drift) > 1) return true;
+    if (has_drifted(lone_.first_pack * kLanes + n, lone_node_[n])) return true;
+  }
+  return false;
+}
+
+template <class P>
+bool HostEngine<P>::boundary_strayed() const {
+  std::size_t known = 0;
+  for (std::size_t t = 0; t < is_boundary_.size(); ++t) {
+    if (is_boundary_[t] == 0) continue;
+    for (std::uint32_t n = 0; n < tiles_[t].particles; ++n) {
+      if (has_drifted(tiles_[t].first_pack * kLanes + n, boundary_node_[known++])) return true;
     }
   }
   return false;

@@ -10,7 +10,7 @@ template <class P>
 void HostEngine<P>::run_task(const SweepTask& task, const PassArguments<P>& arguments, const NodeArguments<P>* trailing,
                              std::vector<TileReport>& reports) {
   // Tiles between two looks at the messages: some ten microseconds.
-  constexpr std::uint32_t kStretch = 32;
+  constexpr std::uint32_t kStretch = 8;
   for (const SweepStep& step : task) {
     for (std::uint32_t n = step.first; n < step.last; ++n) {
       if (!step.update) {

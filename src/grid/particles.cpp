@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <memory>
 #include <vector>
 
 namespace breccia::grid {
@@ -26,6 +27,12 @@ void gather_components(const std::byte* const (&lane)[kLanes], std::byte* to, in
     }
     to += kLanes * sizeof(Element);
   }
+}
+
+// What the lanes of pack p are to hold.
+template <class P>
+std::span<const std::uint32_t, P::kLanes> lanes_of(std::span<const std::uint32_t> source, std::size_t p) {
+  return source.subspan(p * P::kLanes).template first<P::kLanes>();
 }
 
 // One pack of a group, each lane from source[lane]. `old(pack)` is where a pack of before is found.
@@ -93,7 +100,7 @@ class Stretch {
       const auto old = [&](std::size_t q) {
         return q <= p ? &ring_[q % ring_.size()] : q < last_ ? &packs[q] : &behind_[q - last_];
       };
-      gather_pack<P>(source.subspan(p * P::kLanes).template first<P::kLanes>(), table, old, packs[p]);
+      gather_pack<P>(lanes_of<P>(source, p), table, old, packs[p]);
     }
   }
 
@@ -116,10 +123,23 @@ void rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> source, Grou
   if (most > packs.capacity()) packs.reserve(most + most / 16);
   packs.resize(most);
   const auto count = static_cast<std::size_t>(threads);
-  std::vector<Stretch<P, T>> stretches;
-  for (std::size_t n = 0; n < count; ++n) stretches.emplace_back(packs, n * after / count, (n + 1) * after / count, d);
+  if (count * (d.back + d.ahead + 1) > packs.size()) {
+    // Particles that come from anywhere, of other ranks or without grid until now: a copy is less.
+    const LargeArray<T> before(packs);
+#pragma omp parallel for schedule(static) num_threads(threads)
+    for (std::size_t p = 0; p < after; ++p) {
+      gather_pack<P>(
+          lanes_of<P>(source, p), table, [&](std::size_t q) { return &before[q]; }, packs[p]);
+    }
+  } else {
+    std::vector<std::unique_ptr<Stretch<P, T>>> stretches(count);
 #pragma omp parallel for schedule(static, 1) num_threads(threads)
-  for (std::size_t n = 0; n < count; ++n) stretches[n].rearrange(packs, source, table);
+    for (std::size_t n = 0; n < count; ++n) {
+      stretches[n] = std::make_unique<Stretch<P, T>>(packs, n * after / count, (n + 1) * after / count, d);
+    }
+#pragma omp parallel for schedule(static, 1) num_threads(threads)
+    for (std::size_t n = 0; n < count; ++n) stretches[n]->rearrange(packs, source, table);
+  }
   packs.resize(after);
 }
 

@@ -129,8 +129,8 @@ class ParticleStore {
   void drop_damage();
 
   /// Rearranges: new slot s holds what old slot source[s] held; kEmpty makes an empty lane. source.size() is a multiple
-  /// of the lanes. In place: the memory needed beside the particles is that of the packs between old and new places, of
-  /// one group at a time.
+  /// of the lanes. One group at a time. In place where no particle comes from far, so that the memory needed beside the
+  /// particles is that of the packs between old and new places; else with a copy of the group.
   void gather(std::span<const std::uint32_t> source, int threads);
   static constexpr std::uint32_t kEmpty = 0xffffffffU;
 

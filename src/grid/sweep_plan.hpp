@@ -34,8 +34,8 @@ constexpr int sweep_turn(std::int32_t x, std::int32_t period) {
   return odd_one_out ? 2 : x & 1;
 }
 
-/// `tiles`: keys of their blocks, in order; `boundary`: for each tile, whether it is of the boundary. `period` as
-/// above.
+/// `tiles`: keys of the lowest blocks of their stacks, in order; `boundary`: for each tile, whether it is of the
+/// boundary. `period` as above.
 [[nodiscard]] Sweep plan_sweep(std::span<const BlockKey> tiles, std::span<const char> boundary, std::int32_t period,
                                int threads);
 

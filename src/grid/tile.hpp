@@ -19,15 +19,15 @@ inline constexpr int kTileHeight = kStackHeight + 2 * kTileMargin;  ///< nodes o
 /// Lowest block of the stack that a block belongs to.
 constexpr BlockCoord stack_of(BlockCoord b) { return {b.x, b.y, b.z & ~(kStackBlocks - 1)}; }
 
-/// Nodes from one plane x = const of a tile to the next: two more than it holds, since rows that lie 4096 bytes apart
-/// make loads wait for stores they have nothing to do with.
+/// Nodes from one plane x = const of a tile to the next: two more than it holds, so that no two rows of a stencil lie
+/// 4096 bytes apart: that makes loads wait for stores they have nothing to do with.
 inline constexpr int kTilePlane = kTileWidth * kTileHeight + 2;
 inline constexpr int kTileNodes = kTileWidth * kTilePlane;
 
 /// Nodes of a tile along an axis.
 constexpr int tile_extent(int axis) { return axis == 2 ? kTileHeight : kTileWidth; }
 
-/// Index of a node in a tile, coordinates 0 .. 7, along z 0 .. 11.
+/// Index of a node in a tile, coordinates from 0.
 constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTileHeight + z; }
 
 /// The blocks around and of a stack, x slowest.

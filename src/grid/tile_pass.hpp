@@ -7,7 +7,7 @@
 
 namespace breccia::grid {
 
-/// Node values of the tile, read and written: fits the first-level cache in mixed precision.
+/// Node values of the tile, read and written: what a layer of its particles touches fits the first-level cache.
 template <class P>
 struct TileScratch {
   alignas(64) typename P::Real velocities[kTileNodes * kChannels];

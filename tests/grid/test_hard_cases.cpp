@@ -169,6 +169,23 @@ TEST(HardCases, NeighboursAcrossACutThroughABlock) {
   EXPECT_EQ(comm.sum(engine->stats().lone_particles), 0U);
 }
 
+// Well inside the tile, but another rank knows of no node that far.
+TEST(HardCases, MoreThanANodeBesideACutIsTooFar) {
+  const mpi::Comm comm;
+  const auto engine = engine_with(setup_for(Precision::kMixed), {{4.0 * kCell, 0, 0}, {6.0 * kCell, 0, 0}},
+                                  {{15000.0, 0.0, 0.0}, {15000.0, 0.0, 0.0}}, comm);
+  engine->cut(mpi::Slabs(0, std::vector<std::int32_t>(static_cast<std::size_t>(comm.size()) - 1, 6)));
+  const double dt = 0.1;  // 0.6 cells
+  engine->scatter(0.5 * dt);
+  for (int n = 0; n < 2; ++n) {
+    engine->update_grid(dt);
+    engine->gather_scatter(dt);
+  }
+  engine->update_grid(dt);
+  engine->gather(dt);
+  EXPECT_EQ(comm.any(engine->strayed()), comm.size() > 1);
+}
+
 // Several cells in one step, over several slabs: the particle arrives at its new owner with everything it carries.
 TEST(HardCases, ParticlesFindTheirOwnersAgain) {
   const mpi::Comm comm;

@@ -16,7 +16,7 @@ CHANNELS = 8  # values of a node that travel
 # of the sphere.
 RIM = 0.25
 MARGIN = 2  # nodes that a particle reaches beyond the nearest one until the next sorting
-TILE = 21.6  # particles that cost as much as a tile does by itself, on a host core (breccia_bench work)
+TILE = 16.0  # particles that cost as much as a block does by its share of a tile, on a host core (breccia_bench work)
 # Share of a padded mesh that a transposition moves: halves that are zero stay where they are. From the bytes that four
 # ranks sent (docs/performance.md): 12.9 MB an evaluation at 1e6 particles.
 TRANSPOSED = 0.4
