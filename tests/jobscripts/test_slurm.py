@@ -63,10 +63,9 @@ class TimeLimit(unittest.TestCase):
         self.scene.write_text(SCENE)
 
     def test_continues_until_done(self):
-        # A run of about 90 s on this machine, 60 s if other tests have ended by then: the time limit is one minute, the
-        # signal comes 20 s before it or earlier.
+        # A run of about 60 s on this machine: the time limit is one minute, the signal comes 20 s before it or earlier.
         trial = 200
-        end = trial * max(2, int(90 / seconds_until(self.scene, self.folder / "trial", trial)))
+        end = trial * max(2, int(60 / seconds_until(self.scene, self.folder / "trial", trial)))
         with private_slurm.PrivateSlurm(self.folder) as slurm:
             number = self.submit(slurm, end)
             job = self.wait_for_end(slurm, number)
