@@ -90,7 +90,7 @@ class TimeLimit(unittest.TestCase):
             job = slurm.job(number)
             # A job that is queued again has the state of one that ended for a moment.
             ended = ended + 1 if job["JobState"] not in ("PENDING", "RUNNING", "COMPLETING", "REQUEUED") else 0
-            if ended == 5 or job["JobState"] == "COMPLETED":
+            if ended == 30 or job["JobState"] == "COMPLETED":
                 return job
             if job["JobState"] == "PENDING" and job["Reason"] == "BeginTime":
                 # Slurm holds a job back for two minutes after a requeue.
