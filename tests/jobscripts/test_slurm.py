@@ -70,7 +70,7 @@ class TimeLimit(unittest.TestCase):
             number = self.submit(slurm, end)
             job = self.wait_for_end(slurm, number)
         log = (self.folder / "job.log").read_text()
-        self.assertEqual(job["JobState"], "COMPLETED", log)
+        self.assertEqual(job["JobState"], "COMPLETED", f"{log}\n{job}")
         self.assertGreaterEqual(int(job["Restarts"]), 1, log)
         self.assertIn("stopped with a checkpoint: to be continued", log)
         self.assertTrue(log.endswith("done\n"), log)
