@@ -11,8 +11,8 @@ constexpr std::uint64_t kDirectParticles = 2000;
 // Of the mesh, errors down to about 4e-5 were tested.
 constexpr double kSmallestMeshError = 3e-5;
 
-// For the same error smaller bodies need a wider split (mesh/settings.cpp), which costs: at 32,000 particles the mesh takes
-// 0.9 of the tree's time, at 16,000 1.15.
+// For the same error smaller bodies need a wider split (mesh/settings.cpp), which costs: at 32,000 particles the mesh
+// takes 0.9 of the tree's time, at 16,000 1.15.
 constexpr std::uint64_t kLeastMeshParticles = 30'000;
 
 // Times relative to the tree's per particle, measured in states (a), (b), (c) of gravity.md 3 with 94,648 particles:
