@@ -122,10 +122,10 @@ void CudaGravity<Real>::sum_by_mesh(const Extremes& extremes, double mass_unit) 
 // Books the momentum error; returns what is to be taken off each particle, as a share of its |a|.
 template <class Real>
 Vec3d CudaGravity<Real>::net_force(const PredictArguments<Real>& own) {
-  net_forces_.reserve(kReducers);
+  net_forces_.reserve(reducers(own.count));
   launch_net_force(acceleration_.data(), own.particles.mass, own.count, net_forces_.data(), stream_);
   std::array<double, 4> sums{};
-  for (const NetForce& part : net_forces_.download(kReducers, stream_)) {
+  for (const NetForce& part : net_forces_.download(reducers(own.count), stream_)) {
     for (std::size_t k = 0; k < 4; ++k) sums[k] += part.of[k];
   }
   comm_.sum(std::span<double>(sums));

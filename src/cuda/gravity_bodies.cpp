@@ -77,9 +77,10 @@ HostBodies GravityBodies<Real>::own_on_host() const {
 
 template <class Real>
 Extremes GravityBodies<Real>::extremes() {
-  extremes_.reserve(kReducers);
+  const unsigned count = reducers(all_);
+  extremes_.reserve(count);
   launch_extremes(all(), extremes_.data(), stream_);
-  const std::vector<Extremes> parts = extremes_.download(kReducers, stream_);
+  const std::vector<Extremes> parts = extremes_.download(count, stream_);
   Extremes result = parts[0];
   for (const Extremes& part : parts) {
     for (std::size_t k = 0; k < std::size(part.of); ++k) result.of[k] = std::max(result.of[k], part.of[k]);

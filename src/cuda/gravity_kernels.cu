@@ -7,7 +7,7 @@
 namespace breccia::cuda {
 namespace {
 
-constexpr unsigned kThreads = 128;
+constexpr unsigned kThreads = kReducerThreads;
 
 // 2^-32 cells, or a double in cells.
 __device__ __forceinline__ double cells_of(std::int32_t offset) { return 0x1p-32 * static_cast<double>(offset); }
@@ -112,15 +112,16 @@ void launch_predict(const PredictArguments<Real>& a, double* to, cudaStream_t st
 }
 
 void launch_extremes(const BodyArrays& bodies, Extremes* of_block, cudaStream_t stream) {
-  BRECCIA_LAUNCH(extremes, dim3(kReducers), dim3(kThreads), sizeof(ReduceShared<7>), stream, bodies, of_block);
+  BRECCIA_LAUNCH(extremes, dim3(reducers(bodies.count)), dim3(kThreads), sizeof(ReduceShared<7>), stream, bodies,
+                 of_block);
   launched();
 }
 
 template <class Real>
 void launch_net_force(const double* acceleration, const Real* mass, unsigned count, NetForce* of_block,
                       cudaStream_t stream) {
-  BRECCIA_LAUNCH(net_force<Real>, dim3(kReducers), dim3(kThreads), sizeof(ReduceShared<4>), stream, acceleration, mass,
-                 count, of_block);
+  BRECCIA_LAUNCH(net_force<Real>, dim3(reducers(count)), dim3(kThreads), sizeof(ReduceShared<4>), stream, acceleration,
+                 mass, count, of_block);
   launched();
 }
 

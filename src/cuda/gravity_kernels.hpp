@@ -40,8 +40,14 @@ struct PredictArguments {
 template <class Real>
 void launch_predict(const PredictArguments<Real>& a, double* to, cudaStream_t stream);
 
-/// Sums and extremes leave the device as one entry for each of so many thread blocks: equal on every device.
-inline constexpr unsigned kReducers = 128;
+/// Sums and extremes of `count` bodies leave the device as one entry for each of so many thread blocks: equal on every
+/// device, and one for no body.
+inline constexpr unsigned kReducerThreads = 128;
+inline constexpr unsigned kMostReducers = 128;
+constexpr unsigned reducers(unsigned count) {
+  const unsigned blocks = count / kReducerThreads + 1;
+  return blocks < kMostReducers ? blocks : kMostReducers;
+}
 
 /// Largest x, y, z, -x, -y, -z and mass of what a thread block saw; -infinity where that is nothing.
 struct Extremes {

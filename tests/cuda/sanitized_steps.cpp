@@ -1,7 +1,9 @@
 // A few steps of a small scene, a sorting included, through the engine on the emulated device: built with a sanitizer,
-// as racecheck (every lane is a thread to it) or memcheck of every kernel of the step. An argument makes it brief.
+// as racecheck (every lane is a thread to it) or memcheck of every kernel. Racecheck is slow: an argument ("steps",
+// "gravity" or "mesh") asks for one part, briefly, so that the parts run side by side.
 #include <algorithm>
 #include <cstdio>
+#include <string_view>
 #include <vector>
 
 #include "cuda/body_sets.hpp"
@@ -11,6 +13,8 @@
 namespace {
 
 using namespace breccia;
+
+constexpr int kClump = 150;  // the first particles
 
 // Three clumps that share tiles, and particles that share nothing.
 ParticleArrays particles(double cell) {
@@ -24,7 +28,7 @@ ParticleArrays particles(double cell) {
     p.material.push_back(0);
     p.damage.push_back(0.0);
   };
-  for (int n = 0; n < 150; ++n) {
+  for (int n = 0; n < kClump; ++n) {
     const double a = 0.37 * n, b = 0.73 * n;
     add({a - 3.0 * static_cast<int>(a / 3.0), b - 5.0 * static_cast<int>(b / 5.0), 0.02 * n},
         {n % 3 * 30.0, 10.0, -5.0});
@@ -33,14 +37,14 @@ ParticleArrays particles(double cell) {
   return p;
 }
 
-// A box with a mesh has a thousand particles; this one has what a sanitizer can bear.
+// A box with a mesh has a thousand particles; this one, around the clumps, has what a sanitizer can bear.
 template <class Real>
 void sum_in_box(const ParticleArrays& all) {
-  const auto n = static_cast<unsigned>(all.size());
+  constexpr unsigned n = kClump;
   cudaStream_t stream = nullptr;
   cuda::check(cudaStreamCreate(&stream), "stream");
   {
-    std::vector<double> values(4 * all.size());
+    std::vector<double> values(std::size_t{4} * n);
     gravity::Box box{all.position[0], all.position[0]};
     for (std::size_t i = 0; i < n; ++i) {
       const Vec3d x = all.position[i];
@@ -50,7 +54,7 @@ void sum_in_box(const ParticleArrays& all) {
       box.high = {std::max(box.high.x, x.x), std::max(box.high.y, x.y), std::max(box.high.z, x.z)};
     }
     cuda::DeviceArray<double> bodies(values.size());
-    cuda::DeviceArray<double> acceleration(3 * all.size());
+    cuda::DeviceArray<double> acceleration(std::size_t{3} * n);
     bodies.upload(values, stream);
     acceleration.fill_bytes(0, stream);
     const double* x = bodies.data();
@@ -60,32 +64,41 @@ void sum_in_box(const ParticleArrays& all) {
     gravity::Stats stats;
     gravity.add_field(
         sets.sets()[1],
-        {.box = box, .cell = 10e3, .spacing = 5e3, .split = {.scale = 0.8, .cutoff = 3.6}, .mass_unit = all.mass[0]}, 0,
+        {.box = box, .cell = 2e3, .spacing = 1e3, .split = {.scale = 0.8, .cutoff = 3.6}, .mass_unit = all.mass[0]}, 0,
         n, acceleration.data(), stats);
     std::printf("%g pairs, %g m/s2\n", stats.pairs, acceleration.download(1, stream)[0]);
   }
   cuda::check(cudaStreamDestroy(stream), "stream");
 }
 
-template <class P>
-void run(int sortings) {
+grid::EngineSetup setup_for(Precision precision) {
   grid::EngineSetup setup;
   setup.cell = 1000.0;
   setup.materials.resize(1);
   setup.self_gravity = true;
   setup.uniform_gravity = {0.0, 0.0, -1.0};
-  setup.numerics.precision = sizeof(typename P::Real) == 8 ? Precision::kDouble : Precision::kMixed;
-  const ParticleArrays all = particles(setup.cell);
-  sum_in_box<typename P::Real>(all);
+  setup.numerics.precision = precision;
+  return setup;
+}
+
+template <class P>
+void fill(cuda::CudaEngine<P>& engine, const ParticleArrays& all) {
   material::FlawLists flaws;
   for (std::size_t i = 0; i <= all.size(); ++i) flaws.first.push_back(static_cast<std::uint32_t>(2 * i));
   for (std::size_t i = 0; i < all.size(); ++i) flaws.threshold.insert(flaws.threshold.end(), {1e-6F, 1e-3F});
-  cuda::CudaEngine<P> engine(setup, mpi::Comm(MPI_COMM_SELF));
   const std::vector<Vec3d> spin(1);
   engine.insert(all, flaws, spin);
+}
+
+template <class P>
+void attract(cuda::CudaEngine<P>& engine, Precision precision) {
   for (const GravityMethod method : {GravityMethod::kDirect, GravityMethod::kTree}) {
-    engine.make_resident_solver(method, {.precision = setup.numerics.precision})->evaluate_and_hold(1.0);
+    engine.make_resident_solver(method, {.precision = precision})->evaluate_and_hold(1.0);
   }
+}
+
+template <class P>
+void advance(cuda::CudaEngine<P>& engine, int sortings) {
   constexpr double step = 0.02;
   engine.scatter(0.5 * step);
   for (int n = 0; n < sortings; ++n) {
@@ -104,13 +117,27 @@ void run(int sortings) {
               engine.passes().plastic_work);
 }
 
+template <class P>
+void run(Precision precision, std::string_view part, int sortings) {
+  const grid::EngineSetup setup = setup_for(precision);
+  const ParticleArrays all = particles(setup.cell);
+  if (part.empty() || part == "mesh") sum_in_box<typename P::Real>(all);
+  if (part == "mesh") return;
+  cuda::CudaEngine<P> engine(setup, mpi::Comm(MPI_COMM_SELF));
+  fill(engine, all);
+  if (part != "steps") attract(engine, precision);
+  if (part != "gravity") advance(engine, sortings);
+}
+
 }  // namespace
 
 int main(int count, char** arguments) {
   const breccia::mpi::Environment environment(&count, &arguments);
   breccia::cuda_emulation::set_order(breccia::cuda_emulation::Order::kRandom, 1);
-  const bool briefly = count > 1;  // racecheck is slow, and both precisions are the same source
-  run<breccia::MixedPrecision>(briefly ? 1 : 3);
-  if (!briefly) run<breccia::DoublePrecision>(3);
+  const std::string_view part = count > 1 ? arguments[1] : "";
+  if (!part.empty() && part != "steps" && part != "gravity" && part != "mesh") return 2;
+  run<breccia::MixedPrecision>(breccia::Precision::kMixed, part, part.empty() ? 3 : 1);
+  // Both precisions are the same source.
+  if (part.empty()) run<breccia::DoublePrecision>(breccia::Precision::kDouble, part, 3);
   return 0;
 }
