@@ -12,7 +12,7 @@ namespace breccia::gravity {
 namespace {
 
 constexpr std::int64_t kParticles = 1'000'000;
-constexpr std::int64_t kTargets = 2000;
+constexpr std::int64_t kTargets = 4000;
 constexpr int kThreads = 1;
 
 struct Level {
