@@ -1,6 +1,9 @@
 # shellcheck shell=bash
 # Sourced by the job scripts.
 
+# A job shorter than its warning is warned before there is anything to stop.
+trap 'echo "SIGUSR1 before the run began: --time must be longer than the time in --signal" >&2; exit 2' USR1
+
 # Runs a command and hands SIGUSR1 on to it: breccia then writes a checkpoint and ends with 75. Returns its exit code.
 run_with_checkpoint_signal() {
   local child status signalled

@@ -29,7 +29,7 @@ struct EngineState {
   double smallest_mass = 0.0;           ///< of all particles at the start [kg]
   int slab_axis = 0;                    ///< axis the grid is cut along
   std::vector<std::int32_t> slab_cuts;  ///< first plane of nodes of each rank but rank 0
-  bool same_ranks = true;               ///< taken on as many ranks: slabs and shares are to be kept
+  bool same_ranks = true;               ///< taken on as many ranks by this program: slabs are to be kept
 };
 
 }  // namespace breccia

@@ -24,7 +24,9 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::int64_t kFormat = 2;
+constexpr std::int64_t kFormat = 3;
+// The same but for its cuts, which count planes of blocks.
+constexpr std::int64_t kFormatOfBlockCuts = 2;
 constexpr std::string_view kPrefix = "checkpoint_";
 constexpr std::string_view kSuffix = ".h5";
 
@@ -165,12 +167,16 @@ StateColumn read_column(const h5::File& file, const std::string& name, std::uint
 void read_engine(const h5::File& file, EngineState& state, const mpi::Comm& comm) {
   std::int64_t format = 0;
   file.read_attribute("/Engine", "Format", format);
-  if (format != kFormat) throw IoError(fmt::format("format {}, but this program reads {}", format, kFormat));
+  if (format != kFormat && format != kFormatOfBlockCuts) {
+    throw IoError(
+        fmt::format("format {}, but this program reads {} and {}: to be continued by the program that wrote it", format,
+                    kFormatOfBlockCuts, kFormat));
+  }
   const std::uint64_t ranks = file.shape("/Engine/ParticlesOfRank").at(0);
   const auto of_rank = file.read_rows<std::uint64_t>("/Engine/ParticlesOfRank", {0, ranks});
   const std::uint64_t total = std::accumulate(of_rank.begin(), of_rank.end(), std::uint64_t{0});
   const h5::Rows rows = rows_of(of_rank, comm);
-  state.same_ranks = ranks == static_cast<std::uint64_t>(comm.size());
+  state.same_ranks = format == kFormat && ranks == static_cast<std::uint64_t>(comm.size());
   state.particles = rows.count;
   for (const std::string& name : file.read_attribute_texts("/Particles", "Fields")) {
     state.columns.push_back(read_column(file, name, total, rows));

@@ -198,7 +198,7 @@ class Restart(CommandTest):
         self.assertEqual(before, {path.name: path.read_bytes() for path in (self.folder / "out").iterdir()})
         self.run_scene(
             "out", "--restart", "auto", "--steps", 24, "--set", "scene.end=50 s", "--set", "effects.gravity=tree",
-            "--set", "output.snapshots=every 1 s",
+            "--set", "output.snapshots=every 1 s", "--set", "parallel.axis=z",
         )
         self.assertEqual(summary(self.folder / "out")["steps"], 24)
 

@@ -105,6 +105,14 @@ class Scripts(unittest.TestCase):
                 self.assertEqual(process.returncode, 3 if code == 3 else 0, process.stderr)
                 self.assertEqual(self.calls(), calls)
 
+    def test_a_warning_before_the_run_is_explained(self):
+        """Slurm warns a job at its start that is shorter than the time in --signal."""
+        script = f"source {SCRIPTS}/common.sh; kill -USR1 $$; echo run"
+        process = subprocess.run(["bash", "-c", script], capture_output=True, text=True, timeout=60)
+        self.assertEqual(process.returncode, 2, process.stderr)
+        self.assertIn("--time must be longer", process.stderr)
+        self.assertEqual(process.stdout, "")
+
     def test_the_table_has_the_cases_of_the_paper(self):
         cases = set()
         for task in range(135):

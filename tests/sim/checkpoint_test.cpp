@@ -2,6 +2,7 @@
 #include "io/checkpoint.hpp"
 
 #include <gtest/gtest.h>
+#include <hdf5.h>
 
 #include <algorithm>
 #include <cstring>
@@ -259,6 +260,51 @@ TEST(Checkpoint, OtherAxisOfSlabs) {
                 .axis(),
             2);
   expect_near(whole, run_on(across, file.path(), whole.at_checkpoint, comm));
+}
+
+// A file as a program of that format would have left it, as far as the number goes.
+void set_format(const std::filesystem::path& path, std::int64_t format, const mpi::Comm& comm) {
+  if (comm.is_root()) {
+    const hid_t file = H5Fopen(path.c_str(), H5F_ACC_RDWR, H5P_DEFAULT);
+    const hid_t scalar = H5Screate(H5S_SCALAR);
+    EXPECT_GE(H5Adelete_by_name(file, "/Engine", "Format", H5P_DEFAULT), 0);
+    const hid_t attribute =
+        H5Acreate_by_name(file, "/Engine", "Format", H5T_NATIVE_INT64, scalar, H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT);
+    EXPECT_GE(H5Awrite(attribute, H5T_NATIVE_INT64, &format), 0);
+    H5Aclose(attribute);
+    H5Sclose(scalar);
+    H5Fclose(file);
+  }
+  comm.barrier();
+}
+
+// Format 2 has other cuts, which are chosen anew: the same run to rounding. Older and newer ones are refused by number.
+TEST(Checkpoint, OtherFormats) {
+  const mpi::Comm comm;
+  const breccia::test::SharedFile file("checkpoint", comm);
+  const Scene scene = load(collision(9e3), {"gravity.interval=8", "parallel.balance=off"});
+  const Outcome whole = run_through(scene, file.path(), comm);
+  EXPECT_TRUE(io::read_checkpoint(file.path(), comm).engine.same_ranks);
+  set_format(file.path(), 2, comm);
+  EngineState state = io::read_checkpoint(file.path(), comm).engine;
+  EXPECT_FALSE(state.same_ranks);
+  // Taken as they are they would leave all to one rank.
+  state.slab_cuts.assign(state.slab_cuts.size(), 1000);
+  Outcome parts;
+  TimeLoop loop(scene, resolve_effects(scene), state, whole.at_checkpoint, 1, comm);
+  EXPECT_GT(loop.engine().stats().particles, 0U);
+  loop.run(until_end(parts, comm));
+  expect_near(whole, parts);
+  for (const std::int64_t format : {1, 4}) {
+    set_format(file.path(), format, comm);
+    try {
+      static_cast<void>(io::read_checkpoint(file.path(), comm));
+      ADD_FAILURE() << "format " << format << " was read";
+    } catch (const IoError& error) {
+      const std::string expected = "format " + std::to_string(format) + ", but this program reads 2 and 3";
+      EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
+    }
+  }
 }
 
 TEST(Checkpoint, OtherNumberOfRanks) {

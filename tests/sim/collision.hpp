@@ -1,6 +1,9 @@
 // Small scenes with every effect on: what the tests of conservation and of independence from ranks and threads run.
 #pragma once
 
+#include <array>
+#include <string>
+
 #include "tests/sim/simulation.hpp"
 
 namespace breccia::sim::test {
@@ -29,33 +32,45 @@ precision = "double"
 )";
 }
 
-/// A slab of rubble, 1 km cells, that slides over a rough floor in x and y; x repeats after `blocks` blocks of 4 cells.
-inline std::string periodic_slide(int blocks) {
-  const double length = 4e3 * blocks;
-  return "[scene]\nend = \"1000 s\"\n[grid]\ncell = \"1 km\"\n[time]\nstep = \"0.05 s\"\n" +
-         ("[[body]]\nshape = \"box\"\nlattice = \"cubic\"\nspacing = \"500 m\"\ndamage = 1\nsize = [\"" +
-          metres(length) + "\", \"3 km\", \"4 km\"]\nposition = [\"" + metres(0.5 * length)) +
-         R"(", 0, "2 km"]
-velocity = ["150 m/s", "20 m/s", "-5 m/s"]
-[[boundary]]
-normal = [0, 0, 1]
-kind = "friction"
-friction = 0.4
-[[boundary]]
-normal = [1, 0, 0]
-kind = "periodic"
-[[boundary]]
-normal = [-1, 0, 0]
-kind = "periodic"
-point = [")" +
-         metres(length) + R"(", 0, 0]
-[effects]
+/// A vector of a scene file whose components are along `axis` and the two that follow it.
+inline std::string from_axis(int axis, const std::array<std::string, 3>& along) {
+  const auto of = [&](int d) { return along[static_cast<std::size_t>((d - axis + 3) % 3)]; };
+  return "[" + of(0) + ", " + of(1) + ", " + of(2) + "]\n";
+}
+
+/// A slab of rubble, 1 km cells, that slides over a rough floor along `axis` and a little across; the axis repeats
+/// after `blocks` blocks of 4 cells. The floor's normal is along the axis before it.
+inline std::string periodic_slide(int blocks, int axis = 0) {
+  const std::string length = "\"" + metres(4e3 * blocks) + "\"";
+  const std::string middle = "\"" + metres(2e3 * blocks) + "\"";
+  const auto vector = [axis](const std::string& a, const std::string& b, const std::string& c) {
+    return from_axis(axis, {a, b, c});
+  };
+  return R"([scene]
+end = "1000 s"
+[grid]
+cell = "1 km"
+[time]
+step = "0.05 s"
+[[body]]
+shape = "box"
+lattice = "cubic"
+spacing = "500 m"
+damage = 1
+size = )" +
+         vector(length, R"("3 km")", R"("4 km")") + "position = " + vector(middle, "0", R"("2 km")") +
+         "velocity = " + vector(R"("150 m/s")", R"("20 m/s")", R"("-5 m/s")") +
+         "[[boundary]]\nkind = \"friction\"\nfriction = 0.4\nnormal = " + vector("0", "0", "1") +
+         "[[boundary]]\nkind = \"periodic\"\nnormal = " + vector("1", "0", "0") +
+         "[[boundary]]\nkind = \"periodic\"\nnormal = " + vector("-1", "0", "0") +
+         "point = " + vector(length, "0", "0") +
+         R"([effects]
 gravity = "direct"
-[gravity]
-uniform = [0, 0, "-1 m/s2"]
 [numerics]
 precision = "double"
-)";
+[gravity]
+uniform = )" +
+         vector("0", "0", R"("-1 m/s2")");
 }
 
 }  // namespace breccia::sim::test

@@ -68,15 +68,21 @@ precision = "double"
 }
 
 // Along a periodic axis the first and the last slab are neighbours; one block is its own neighbour on both sides, two
-// are neighbours twice, an odd number needs a third colour.
-class PeriodicRanks : public testing::TestWithParam<int> {};
+// are neighbours twice, an odd number needs a third colour. Along z tiles are stacks of four blocks: a part of one, and
+// one and a part of the next. All are cut across that axis, one block through itself.
+class PeriodicRanks : public testing::TestWithParam<std::pair<int, int>> {};
 TEST_P(PeriodicRanks, SlideThroughTheEnds) {
-  const double length = 4e3 * GetParam();
-  const Work work = expect_same_as_one_rank(load(periodic_slide(GetParam())), {length, 150.0, length});
-  // One block alone is cut along another axis.
-  EXPECT_TRUE(ranks() == 1 || GetParam() == 1 || work.migrated > 50) << work.migrated;
+  const auto [axis, blocks] = GetParam();
+  const double length = 4e3 * blocks;
+  const std::string across = std::string("parallel.axis=") + "xyz"[axis];
+  const Work work =
+      expect_same_as_one_rank(load(periodic_slide(blocks, axis), {across}), {length, 150.0, length, axis});
+  EXPECT_GE(work.busy_ranks, std::min(ranks(), 4 * blocks));
+  EXPECT_TRUE(ranks() == 1 || work.migrated > 50) << work.migrated;
 }
-INSTANTIATE_TEST_SUITE_P(Blocks, PeriodicRanks, testing::Values(1, 2, 3, 4));
+INSTANTIATE_TEST_SUITE_P(AxisAndBlocks, PeriodicRanks,
+                         testing::Values(std::pair(0, 1), std::pair(0, 2), std::pair(0, 3), std::pair(2, 1),
+                                         std::pair(2, 2), std::pair(2, 3), std::pair(2, 5)));
 
 // Messages that travel behind the interior tiles carry the same values as those that are waited for at once: what is
 // added to shared nodes, and in which order, does not depend on when it arrives. Bodies on a wall, so that nodes of the
