@@ -49,6 +49,24 @@ std::unique_ptr<Engine> engine_with(const EngineSetup& setup, const std::vector<
   return engine;
 }
 
+// `steps` steps up to a t_n at which the engine can be observed, the particles sorted after every `sort_every` of them.
+// `swept`: the other steps gather and scatter in one sweep.
+void advance(Engine& engine, double dt, int steps, int sort_every, bool swept) {
+  engine.scatter(0.5 * dt);
+  for (int n = 1; n <= steps; ++n) {
+    engine.update_grid(dt);
+    const bool sorts = n % sort_every == 0;
+    if (swept && !sorts) {
+      engine.gather_scatter(dt);
+      continue;
+    }
+    engine.gather(dt);
+    if (sorts) engine.sort();
+    engine.scatter(0.5 * dt);
+  }
+  engine.update_grid(dt);
+}
+
 // Cases 1, 2 and 18: positions on faces, at half cells, a hair beside them, on both sides of zero. A lone particle must
 // move straight on whatever its weights are: the affine field of one particle is reproduced exactly.
 void expect_straight(Precision precision, bool lone_without_grid) {
@@ -65,14 +83,7 @@ void expect_straight(Precision precision, bool lone_without_grid) {
   EXPECT_EQ(comm.sum(engine->stats().lone_particles) > 0, lone_without_grid);
   const double dt = 0.1220703125;
   constexpr int kSteps = 200;
-  engine->scatter(0.5 * dt);
-  for (int n = 1; n <= kSteps; ++n) {
-    engine->update_grid(dt);
-    engine->gather(dt);
-    if (n % 16 == 0) engine->sort();
-    engine->scatter(0.5 * dt);
-  }
-  engine->update_grid(dt);
+  advance(*engine, dt, kSteps, 16, false);
   const ParticleOutput out = engine->observe();
   // Mixed: 6e-8 of 100 m/s per step may go one way for all 200 steps: 1.2e-3 m/s, 0.03 m.
   const double tolerance = precision == Precision::kMixed ? 0.05 : 1e-8;
@@ -97,18 +108,7 @@ void expect_slow_drift(bool lone_without_grid) {
       engine_with(setup_for(Precision::kMixed, lone_without_grid), {{2e7, -2e7, 2e7}}, {{1.0, 0.0, 0.0}}, comm);
   const double dt = 0.1220703125;
   constexpr int kSteps = 10000;
-  engine->scatter(0.5 * dt);
-  for (int n = 1; n <= kSteps; ++n) {
-    engine->update_grid(dt);
-    if (n % 32 == 0) {
-      engine->gather(dt);
-      engine->sort();
-      engine->scatter(0.5 * dt);
-    } else {
-      engine->gather_scatter(dt);
-    }
-  }
-  engine->update_grid(dt);
+  advance(*engine, dt, kSteps, 32, true);
   const ParticleOutput out = engine->observe();
   // 1 m/s dt is 209715.2 units of 2^-32 cells, rounded to 0.2 of them: 1e-6 of 1220.7 m.
   for (const Vec3d& x : out.position) EXPECT_NEAR(x.x, 2e7 + kSteps * dt, 0.01);
@@ -197,14 +197,7 @@ TEST(HardCases, ParticlesFindTheirOwnersAgain) {
   }
   const auto engine = engine_with(setup_for(Precision::kDouble), x, v, comm);
   const double dt = 0.1;  // 0.6 cells
-  engine->scatter(0.5 * dt);
-  for (int n = 0; n < 40; ++n) {
-    engine->update_grid(dt);
-    engine->gather(dt);
-    engine->sort();
-    engine->scatter(0.5 * dt);
-  }
-  engine->update_grid(dt);
+  advance(*engine, dt, 40, 1, false);
   const ParticleOutput out = engine->observe();
   std::uint64_t ids = 0;
   for (const std::uint64_t id : out.id) ids += id;

@@ -109,19 +109,17 @@ Inflow inflow(int cells_per_radius) {
   return apart;
 }
 
-// Before contact bodies move as their centres would (physics.md 7: to 1e-4). What is left is the roughness of the
-// spheres, which falls with the cell at second order, and at 4 cells, with 1.6 between the bodies, the grid they share.
+// Before contact bodies move as their centres would (physics.md 7: to 1e-4). What is left is no error of the step (the
+// test above has its order) but the roughness of the spheres, which differs from cell to cell at random, some 1e-6:
+// there is no order in it. At 4 cells, with 1.6 between the bodies, the grid they share adds 4e-5 to the velocity.
 TEST(Verification, InflowIsKeplersMotion) {
-  std::vector<std::pair<double, double>> errors;
   for (const int cells : levels({4, 6, 8}, {11})) {
     const Inflow apart = inflow(cells);
     record("inflow", "relative position at 2.4 R", cells, apart.position, 0.0, "exact: Kepler");
     record("inflow", "relative velocity at 2.4 R", cells, apart.velocity, 0.0, "exact: Kepler");
-    errors.emplace_back(1.0 / cells, apart.position);
-    EXPECT_LT(apart.position, 1e-4) << cells;
-    EXPECT_LT(apart.velocity, 1e-4) << cells;
+    EXPECT_LT(apart.position, 1e-5) << cells;
+    EXPECT_LT(apart.velocity, cells > 4 ? 1e-5 : 1e-4) << cells;
   }
-  EXPECT_GT(observed_order(errors), 1.3);
 }
 
 }  // namespace
