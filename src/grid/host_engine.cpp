@@ -121,7 +121,8 @@ void HostEngine<P>::update_grid(double kick) {
     for (std::size_t n = ordered_.shared_sums(); n < ordered_.sums(); ++n) {
       ordered_.add_up(n, sums_.data(), rows_.data());
     }
-#pragma omp for schedule(static)
+    // What the passes have left lies together: blocks that no tile stands in.
+#pragma omp for schedule(dynamic)
     for (std::uint32_t b = 0; b < blocks; b += kChunk) kernels_.update_blocks(a, b, std::min(b + kChunk, blocks));
   }
   boundaries_.apply_to_rest(velocities_.data());

@@ -98,6 +98,7 @@ class HostEngine final : public Engine {
   // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
   void settle(std::vector<Placement> placements);
   void choose_slabs(std::span<const Placement> placements);
+  [[nodiscard]] Placement place(std::size_t slot, BlockCoord stack) const;  // of a particle that has moved
   [[nodiscard]] std::vector<Placement> place_all() const;
   void migrate(std::vector<Placement>& placements);
   [[nodiscard]] std::vector<char> find_lone(Occupancy& occupancy) const;  // for each block of it

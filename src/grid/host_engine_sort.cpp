@@ -36,22 +36,38 @@ using mpi::put;
 }  // namespace
 
 template <class P>
+Placement HostEngine<P>::place(std::size_t slot, BlockCoord stack) const {
+  const std::int32_t packed = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
+  Placement p{static_cast<std::uint32_t>(slot), {}};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t node = kBlockWidth * component(stack, axis) + ((packed >> (8 * axis)) & 255) - kNodeBias;
+    p.node[axis] = kBlockWidth * periodicity_.wrap(floor_div4(node), axis) + (node & 3);
+  }
+  return p;
+}
+
+template <class P>
 std::vector<Placement> HostEngine<P>::place_all() const {
-  std::vector<Placement> placements;
-  placements.reserve(store_.packs() * kLanes);
-  for_each_particle([&](std::size_t slot, BlockCoord stack) {
-    const std::int32_t packed = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
-    Placement p{static_cast<std::uint32_t>(slot), {}};
-    for (int axis = 0; axis < 3; ++axis) {
-      const std::int32_t node = kBlockWidth * component(stack, axis) + ((packed >> (8 * axis)) & 255) - kNodeBias;
-      const std::int32_t wrapped = periodicity_.wrap(floor_div4(node), axis);
-      if (wrapped > kBlockLimit || wrapped < -kBlockLimit) {
-        throw NumericsError("particle " + std::to_string(id(slot)) + " is more than 4 million cells from the origin");
-      }
-      p.node[axis] = kBlockWidth * wrapped + (node & 3);
+  std::vector<std::size_t> first(tiles_.size() + 1, 0);
+  for (std::size_t t = 0; t < tiles_.size(); ++t) first[t + 1] = first[t] + tiles_[t].particles;
+  std::vector<Placement> placements(first.back() + lone_.particles);
+#pragma omp parallel for schedule(static) num_threads(setup_.threads)
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    const BlockCoord stack = block_coord(stacks_[t]);
+    for (std::uint32_t n = 0; n < tiles_[t].particles; ++n) {
+      placements[first[t] + n] = place(tiles_[t].first_pack * kLanes + n, stack);
     }
-    placements.push_back(p);
-  });
+  }
+  for (std::uint32_t n = 0; n < lone_.particles; ++n) {
+    placements[first.back() + n] = place(lone_.first_pack * kLanes + n, lone_stack_[n]);
+  }
+  for (const Placement& p : placements) {
+    for (const std::int32_t node : p.node) {
+      if (std::abs(floor_div4(node)) > kBlockLimit) {
+        throw NumericsError("particle " + std::to_string(id(p.slot)) + " is more than 4 million cells from the origin");
+      }
+    }
+  }
   return placements;
 }
 

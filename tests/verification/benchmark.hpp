@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdio>
+#include <cstdlib>
 #include <string>
 #include <utility>
 #include <vector>
@@ -16,6 +17,12 @@ namespace breccia::sim::test {
 inline void record(const char* name, const char* quantity, double resolution, double measured, double expected,
                    const char* source) {
   std::printf("verification|%s|%s|%.6g|%.8g|%.8g|%s\n", name, quantity, resolution, measured, expected, source);
+}
+
+/// Resolutions to run: `quick` always, `finer` as well where tools/verify asks for them.
+inline std::vector<int> levels(std::vector<int> quick, const std::vector<int>& finer) {
+  if (std::getenv("BRECCIA_FINER_LEVELS") != nullptr) quick.insert(quick.end(), finer.begin(), finer.end());
+  return quick;
 }
 
 /// Least-squares slope of log|error| over log h, the observed order of convergence. `h_error`: pairs of both.
@@ -34,10 +41,17 @@ inline std::string plane(Vec3d point, const char* normal, const std::string& kin
          "\"]\nnormal = " + normal + "\nkind = \"" + kind + "\"\n";
 }
 
-/// Planes that make a width of [0, width] in y and z endless.
-inline std::string endless_across(double width) {
-  return plane({}, "[0, 1, 0]", "periodic") + plane({0, width, 0}, "[0, -1, 0]", "periodic") +
-         plane({}, "[0, 0, 1]", "periodic") + plane({0, 0, width}, "[0, 0, -1]", "periodic");
+/// Planes that make [0, width] along the axis of `normal` endless.
+inline std::string endless(double width, const std::string& normal) {
+  const Vec3d far = normal == "[1, 0, 0]"   ? Vec3d{width, 0, 0}
+                    : normal == "[0, 1, 0]" ? Vec3d{0, width, 0}
+                                            : Vec3d{0, 0, width};
+  std::string back = normal;
+  back.insert(back.find('1'), "-");
+  return plane({}, normal.c_str(), "periodic") + plane(far, back.c_str(), "periodic");
 }
+
+/// Planes that make a width of [0, width] in y and z endless.
+inline std::string endless_across(double width) { return endless(width, "[0, 1, 0]") + endless(width, "[0, 0, 1]"); }
 
 }  // namespace breccia::sim::test
