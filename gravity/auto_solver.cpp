@@ -17,7 +17,7 @@ void AutoSolver<Real>::evaluate(ParticlesView particles, std::span<Vec3d> accele
     });
     parameters_.mesh.particle_spacing = layout.spacing;
   }
-  const MethodChoice choice = cheapest_method(matter, parameters_.error);
+  const MethodChoice choice = cheapest_method(matter, parameters_);
   if (choice.method == GravityMethod::kTreePm) {
     mesh_.evaluate_in(layout, particles, acceleration, potential);
     used_ = &mesh_;

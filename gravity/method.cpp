@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "gravity/tree/tolerance.hpp"
+
 namespace breccia::gravity {
 namespace {
 
@@ -15,6 +19,9 @@ constexpr double kSmallestMeshError = 3e-5;
 // takes 0.9 of the tree's time, at 16,000 1.15.
 constexpr std::uint64_t kLeastMeshParticles = 30'000;
 
+// Of smaller ones even the widest split leaves more than the error asked for.
+constexpr std::uint64_t kLeastAccurateBody = 8'000;
+
 // Times relative to the tree's per particle, measured in states (a), (b), (c) of gravity.md 3 with 94,648 particles:
 // pairs and sorting in a box, transforms, and the tree that is left where particles lie outside or boxes are several.
 constexpr double kBoxedParticle = 0.4;
@@ -25,9 +32,23 @@ constexpr double kOutsideParticle = 1.0;
 double mesh_over_tree(const Matter& matter) {
   const auto all = static_cast<double>(matter.particles);
   const auto boxed = static_cast<double>(matter.in_boxes);
-  const bool needs_tree = matter.in_boxes < matter.particles || matter.boxes > 1;
+  const bool needs_tree = matter.in_boxes < matter.particles || matter.bodies.size() > 1;
   const double tree = needs_tree ? kTreeOfAll * all + kOutsideParticle * (all - boxed) : 0.0;
   return (kBoxedParticle * boxed + kMeshNode * matter.mesh_nodes + tree) / all;
+}
+
+// Of tree and mesh, the one that costs less.
+MethodChoice cheaper(const Matter& matter) {
+  if (matter.in_boxes < kLeastMeshParticles * matter.bodies.size()) {
+    return {GravityMethod::kTree, fmt::format("tree, as a mesh does not pay for dense bodies of less than {} particles",
+                                              kLeastMeshParticles)};
+  }
+  const double cost = mesh_over_tree(matter);
+  const double percent = 100.0 * static_cast<double>(matter.in_boxes) / static_cast<double>(matter.particles);
+  const std::string why =
+      fmt::format("{:.3g} % of the particles in dense bodies: a mesh costs {:.2g} of the tree", percent, cost);
+  return cost < 1.0 ? MethodChoice{GravityMethod::kTreePm, "particle mesh, " + why}
+                    : MethodChoice{GravityMethod::kTree, "tree, " + why};
 }
 
 }  // namespace
@@ -52,7 +73,8 @@ bool prefers_direct_sum(std::uint64_t particles, double error) {
   return particles <= kDirectParticles || error < kSmallestTreeError;
 }
 
-MethodChoice cheapest_method(const Matter& matter, double error) {
+MethodChoice cheapest_method(const Matter& matter, const Parameters& parameters) {
+  const double error = parameters.error;
   if (matter.particles <= kDirectParticles) {
     return {GravityMethod::kDirect, fmt::format("direct sum for up to {} particles", kDirectParticles)};
   }
@@ -60,21 +82,25 @@ MethodChoice cheapest_method(const Matter& matter, double error) {
     return {GravityMethod::kDirect,
             fmt::format("direct sum, as gravity.error is below {:.0e}, the tree's best", kSmallestTreeError)};
   }
-  if (matter.in_boxes == 0) return {GravityMethod::kTree, "tree, as there is no dense body to lay a mesh around"};
+  if (matter.bodies.empty()) return {GravityMethod::kTree, "tree, as there is no dense body to lay a mesh around"};
   if (error < kSmallestMeshError) {
     return {GravityMethod::kTree,
             fmt::format("tree, as gravity.error is below {:.0e}, the mesh's best", kSmallestMeshError)};
   }
-  if (matter.in_boxes < kLeastMeshParticles * static_cast<std::uint64_t>(matter.boxes)) {
-    return {GravityMethod::kTree, fmt::format("tree, as a mesh does not pay for dense bodies of less than {} particles",
-                                              kLeastMeshParticles)};
-  }
-  const double cost = mesh_over_tree(matter);
-  const double percent = 100.0 * static_cast<double>(matter.in_boxes) / static_cast<double>(matter.particles);
-  const std::string why =
-      fmt::format("{:.3g} % of the particles in dense bodies: a mesh costs {:.2g} of the tree", percent, cost);
-  return cost < 1.0 ? MethodChoice{GravityMethod::kTreePm, "particle mesh, " + why}
-                    : MethodChoice{GravityMethod::kTree, "tree, " + why};
+  const bool accurate = std::all_of(matter.bodies.begin(), matter.bodies.end(),
+                                    [](const DenseBody& body) { return body.particles >= kLeastAccurateBody; });
+  MethodChoice choice = cheaper(matter);
+  if (choice.method == GravityMethod::kTreePm || !accurate) return choice;
+  // A mesh disturbs bodies less than the tree wherever it is laid.
+  const double opening = opening_for(parameters, static_cast<double>(matter.particles));
+  const double by_tree = body_error_of_tree(matter.bodies, opening);
+  const double by_mesh = body_error_of_mesh(matter.bodies, opening);
+  if (by_tree <= kBodyTolerance * error || by_mesh >= by_tree) return choice;
+  return {
+      GravityMethod::kTreePm,
+      fmt::format("particle mesh, though dearer: the tree's net force on a dense body would be off by {:.1e} of the "
+                  "pull on it, the mesh's by {:.1e}; {:.1e} is allowed",
+                  by_tree, by_mesh, kBodyTolerance * error)};
 }
 
 }  // namespace breccia::gravity

@@ -3,17 +3,20 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "breccia/scene.hpp"
+#include "gravity/body_force.hpp"
+#include "gravity/solver.hpp"
 
 namespace breccia::gravity {
 
 /// Matter of all ranks.
 struct Matter {
   std::uint64_t particles = 0;
-  std::uint64_t in_boxes = 0;  ///< of them, in boxes that would get a mesh
-  double mesh_nodes = 0.0;     ///< of these boxes, not doubled
-  int boxes = 0;
+  std::uint64_t in_boxes = 0;       ///< of them, in boxes that would get a mesh
+  double mesh_nodes = 0.0;          ///< of these boxes, not doubled
+  std::vector<DenseBody> bodies{};  ///< what is in them, one for each
 };
 
 /// Below this error the float fields of the tree no longer follow the opening.
@@ -30,9 +33,9 @@ struct MethodChoice {
 /// True up to some thousand particles, or where the error asked for is below what tree and mesh can do.
 bool prefers_direct_sum(std::uint64_t particles, double error);
 
-/// The method kAuto stands for. Where dense bodies hold most particles the particle mesh is cheaper than the tree, and
-/// leaves bodies without debris a spurious acceleration hundreds of times smaller (gravity.md 3); elsewhere it would
-/// pay twice.
-MethodChoice cheapest_method(const Matter& matter, double error);
+/// The method kAuto stands for: the cheapest whose particles are right to Parameters::error and whose net force on each
+/// dense body is to kBodyTolerance times that. Where dense bodies hold most particles the particle mesh is cheaper than
+/// the tree; elsewhere it would pay twice, and is taken where the tree would disturb the bodies too much.
+MethodChoice cheapest_method(const Matter& matter, const Parameters& parameters);
 
 }  // namespace breccia::gravity

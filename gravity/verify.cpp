@@ -1,6 +1,7 @@
 #include "gravity/verify.hpp"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <span>
 
@@ -16,20 +17,44 @@ namespace {
 constexpr std::uint32_t kSampleStream = 0x76657269;
 
 // Adds what this rank's particles do to the targets, in units of G times the mass unit.
-void add_own(const Points<double>& own, const Points<double>& targets, double softening, int threads,
+template <class Real>
+void add_own(const Points<Real>& own, const Points<Real>& targets, double softening, int threads,
              std::vector<double> (&sums)[3]) {
   const std::int64_t groups = padded(targets.arrays().count) / kTargetGroup;
 #pragma omp parallel for num_threads(threads) schedule(static)
   for (std::int64_t group = 0; group < groups; ++group) {
-    sum_pairs(PairTask<double>{.targets = targets.arrays(),
-                               .begin = group * kTargetGroup,
-                               .end = (group + 1) * kTargetGroup,
-                               .sources = own.arrays(),
-                               .same = false,
-                               .softening_squared = softening * softening,
-                               .acceleration = {sums[0].data(), sums[1].data(), sums[2].data()},
-                               .potential = nullptr});
+    sum_pairs(PairTask<Real>{.targets = targets.arrays(),
+                             .begin = group * kTargetGroup,
+                             .end = (group + 1) * kTargetGroup,
+                             .sources = own.arrays(),
+                             .same = false,
+                             .softening_squared = static_cast<Real>(softening * softening),
+                             .acceleration = {sums[0].data(), sums[1].data(), sums[2].data()},
+                             .potential = nullptr});
   }
+}
+
+// The particles of all ranks whose flag is `wanted`, or only those of this one.
+struct Part {
+  std::vector<Vec3d> position;
+  std::vector<double> mass;
+
+  Part(ParticlesView particles, std::span<const char> flags, char wanted) {
+    for (std::size_t i = 0; i < flags.size(); ++i) {
+      if (flags[i] != wanted) continue;
+      position.push_back(particles.position[i]);
+      mass.push_back(particles.mass[i]);
+    }
+  }
+  void gather(const mpi::Comm& comm) {
+    position = comm.allgather_arrays(std::span<const Vec3d>(position));
+    mass = comm.allgather_arrays(std::span<const double>(mass));
+  }
+};
+
+Vec3d mean_of(std::array<double, 4> sums, const mpi::Comm& comm) {
+  comm.sum(std::span<double>(sums));
+  return (1.0 / sums[3]) * Vec3d{sums[0], sums[1], sums[2]};
 }
 
 // Every particle is drawn with the same probability; which ones depends on their global numbers alone.
@@ -94,6 +119,38 @@ std::vector<Vec3d> direct_acceleration(ParticlesView particles, const std::vecto
     result.push_back(unit * Vec3d{sums[0][k], sums[1][k], sums[2][k]});
   }
   return result;
+}
+
+Vec3d pull_on_body(ParticlesView particles, std::span<const char> in_body, double softening, const mpi::Comm& comm,
+                   int threads) {
+  const Part outside(particles, in_body, 0);
+  Part body(particles, in_body, 1);
+  body.gather(comm);
+  const double mass_unit = heaviest(particles.mass, comm);
+  Points<float> sources, targets;
+  sources.fill({outside.position, outside.mass}, mass_unit);
+  targets.fill({body.position, body.mass}, mass_unit);
+  std::vector<double> sums[3];
+  for (auto& s : sums) s.assign(static_cast<std::size_t>(padded(static_cast<std::int64_t>(body.mass.size()))), 0.0);
+  add_own(sources, targets, softening, threads, sums);
+  std::array<double, 4> of_body{};
+  for (std::size_t i = 0; i < body.mass.size(); ++i) {
+    for (std::size_t k = 0; k < 3; ++k) of_body[k] += body.mass[i] * sums[k][i];
+    of_body[3] += body.mass[i] / comm.size();
+  }
+  return kGravitationalConstant * mass_unit * mean_of(of_body, comm);
+}
+
+Vec3d mean_acceleration(ParticlesView particles, std::span<const char> in_body, std::span<const Vec3d> acceleration,
+                        const mpi::Comm& comm) {
+  std::array<double, 4> of_body{};
+  for (std::size_t i = 0; i < in_body.size(); ++i) {
+    if (in_body[i] == 0) continue;
+    const double m = particles.mass[i];
+    const double values[4] = {m * acceleration[i].x, m * acceleration[i].y, m * acceleration[i].z, m};
+    for (std::size_t k = 0; k < 4; ++k) of_body[k] += values[k];
+  }
+  return mean_of(of_body, comm);
 }
 
 FieldErrors field_errors(std::span<const Vec3d> is, std::span<const Vec3d> should, const mpi::Comm& comm) {

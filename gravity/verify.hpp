@@ -21,6 +21,15 @@ struct FieldErrors {
 std::vector<Vec3d> direct_acceleration(ParticlesView particles, const std::vector<std::int64_t>& targets,
                                        double softening, const mpi::Comm& comm, int threads);
 
+/// Mean acceleration, by mass, of a body [m/s2]: that by all particles outside, as those inside move it nowhere.
+/// `in_body`: 1 for its particles. Float differences of exact coordinates, sums in double: right to 1e-6. Collective.
+Vec3d pull_on_body(ParticlesView particles, std::span<const char> in_body, double softening, const mpi::Comm& comm,
+                   int threads);
+
+/// What the body has of accelerations of all particles. Collective.
+Vec3d mean_acceleration(ParticlesView particles, std::span<const char> in_body, std::span<const Vec3d> acceleration,
+                        const mpi::Comm& comm);
+
 /// Errors of accelerations `is` of this rank's targets, with those of the other ranks. Collective; the result is the
 /// same on all ranks.
 FieldErrors field_errors(std::span<const Vec3d> is, std::span<const Vec3d> should, const mpi::Comm& comm);

@@ -15,6 +15,7 @@ struct Layout {
   std::vector<Box> boxes;
   std::vector<std::uint8_t> set;     ///< of each particle: 0 outside, k in box k - 1
   std::vector<std::uint64_t> count;  ///< particles of all ranks in each set
+  std::vector<double> mass;          ///< of these [kg]
 };
 
 /// Chooses boxes and deals the particles out to them; a spacing of 0 is found from the particles. Collective.

@@ -21,8 +21,8 @@ namespace {
 
 constexpr std::int64_t kVerified = 10'000;
 
-// Bodies of more particles are too dear to sum directly for their momentum.
-constexpr std::int64_t kLargestBody = 100'000;
+// Of more particles the pull on the first body is summed only where that is asked for: at a million, a minute.
+constexpr std::int64_t kMostForBody = 100'000;
 
 // Particles summed directly per slice: long enough to time, short enough to follow each evaluation.
 constexpr std::int64_t kSlicePairs = 1'000'000'000;
@@ -100,26 +100,20 @@ struct Measured {
 
 double norm(Vec3d a) { return std::sqrt(dot(a, a)); }
 
-// What one state is measured against, computed once: direct sums of a sample, and of the whole first body.
+// What one state is measured against, computed once: direct sums of a sample, and the pull on the first body.
 class Reference {
  public:
-  Reference(const GravityState& state, const Share& share, int threads) : state_(state), share_(share) {
+  Reference(const GravityState& state, const Share& share, const GravityBenchOptions& options)
+      : share_(share), in_body_(std::span(state.in_body).subspan(share.first, share.count)) {
     const auto all = static_cast<std::int64_t>(state.position.size());
     for (std::int64_t k = 0; k < std::min(kVerified, all); ++k) {
       const auto i = static_cast<std::size_t>(all * k / std::min(kVerified, all));
       if (i >= share.first && i < share.first + share.count)
         sample_.push_back(static_cast<std::int64_t>(i - share.first));
     }
-    exact_ = gravity::direct_acceleration(share.view, sample_, state.softening, comm_, threads);
-    if (std::count(state.in_body.begin(), state.in_body.end(), 1) > kLargestBody) return;
-    std::vector<std::int64_t> body;
-    for (std::size_t i = 0; i < share.count; ++i) {
-      if (state.in_body[share.first + i] != 0) body.push_back(static_cast<std::int64_t>(i));
-    }
-    std::vector<Vec3d> pull(share.count);
-    const std::vector<Vec3d> exact = gravity::direct_acceleration(share.view, body, state.softening, comm_, threads);
-    for (std::size_t k = 0; k < body.size(); ++k) pull[static_cast<std::size_t>(body[k])] = exact[k];
-    pull_ = body_acceleration(pull);
+    exact_ = gravity::direct_acceleration(share.view, sample_, state.softening, comm_, options.threads);
+    if (all > kMostForBody && !options.body) return;
+    pull_ = gravity::pull_on_body(share.view, in_body_, state.softening, comm_, options.threads);
   }
   [[nodiscard]] gravity::FieldErrors errors(std::span<const Vec3d> a) const {
     std::vector<Vec3d> is;
@@ -129,24 +123,12 @@ class Reference {
   // Spurious acceleration of the body over the true pull on it.
   [[nodiscard]] std::optional<double> body_error(std::span<const Vec3d> a) const {
     if (!pull_) return std::nullopt;
-    return norm(body_acceleration(a) - *pull_) / norm(*pull_);
+    return norm(gravity::mean_acceleration(share_.view, in_body_, a, comm_) - *pull_) / norm(*pull_);
   }
 
  private:
-  [[nodiscard]] Vec3d body_acceleration(std::span<const Vec3d> a) const {
-    std::array<double, 4> sums{};
-    for (std::size_t i = 0; i < share_.count; ++i) {
-      if (state_.in_body[share_.first + i] == 0) continue;
-      const double m = state_.mass[share_.first + i];
-      const double values[4] = {m * a[i].x, m * a[i].y, m * a[i].z, m};
-      for (std::size_t k = 0; k < 4; ++k) sums[k] += values[k];
-    }
-    comm_.sum(std::span<double>(sums));
-    return (1.0 / sums[3]) * Vec3d{sums[0], sums[1], sums[2]};
-  }
-
-  const GravityState& state_;
   const Share& share_;
+  std::span<const char> in_body_;
   mpi::Comm comm_;
   std::vector<std::int64_t> sample_;
   std::vector<Vec3d> exact_;
@@ -251,7 +233,7 @@ void run_gravity_bench(const GravityBenchOptions& options) {
     for (const char name : options.states) {
       const GravityState state = gravity_state(name, n);
       const Share share(state);
-      const Reference reference(state, share, options.threads);
+      const Reference reference(state, share, options);
       DirectSlice slice(state, options.threads);
       for (const Setting& setting : settings(options, state.softening)) {
         const Measured m = measure(share, reference, slice, setting, options);

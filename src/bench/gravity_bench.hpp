@@ -12,6 +12,7 @@ struct GravityBenchOptions {
   std::string states = "abc";           ///< of gravity_states.hpp
   std::vector<std::int64_t> particles;  ///< empty: 94,648 and, unless quick, 1e6
   std::vector<double> openings;         ///< of the tree; empty: fast, default and tight
+  bool body = false;                    ///< the net force on the first body at more than 100,000 particles too
   int threads = 1;
   int pairs = 5;     ///< evaluations, each followed by a slice of the direct sum
   std::string json;  ///< file for the results, "-" for standard output, empty for none

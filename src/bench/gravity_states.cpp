@@ -106,9 +106,10 @@ GravityState gravity_state(char name, std::int64_t particles) {
   state.softening = 0.05 * std::cbrt(particle_volume * 1.41);
   Builder builder(state, kDensity * particle_volume);
   std::int64_t body = particles / 2;
-  if (name == 'a') {
-    builder.add_ellipsoid(body, {-100e3, 0, 0}, sphere);
-    builder.add_ellipsoid(particles - body, {100e3, 0, 0}, sphere);
+  if (name == 'a' || name == 'p' || name == 'q') {
+    const double half = name == 'a' ? 100e3 : (name == 'p' ? 500e3 : 2500e3);
+    builder.add_ellipsoid(body, {-half, 0, 0}, sphere);
+    builder.add_ellipsoid(particles - body, {half, 0, 0}, sphere);
   } else if (name == 'b' || name == 'n' || name == 'f') {
     body = particles * 3 / 4;
     builder.add_ellipsoid(body, {0, 0, 0}, {119e3, 40e3, 40e3});
@@ -129,7 +130,7 @@ GravityState gravity_state(char name, std::int64_t particles) {
     }
     builder.add_ejecta(particles - static_cast<std::int64_t>(state.position.size()), 300e3, 2e7);
   } else {
-    throw UsageError("gravity states are a, b, c, n and f; not " + std::string(1, name));
+    throw UsageError("gravity states are a, b, c, n, f, p and q; not " + std::string(1, name));
   }
   state.in_body.assign(state.position.size(), 0);
   std::fill_n(state.in_body.begin(), body, char{1});

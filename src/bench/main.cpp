@@ -28,9 +28,10 @@ int measure(int argc, char** argv) {
   breccia::bench::GravityBenchOptions gravity_options;
   CLI::App* gravity = app.add_subcommand("gravity", "time and error of self-gravity");
   gravity->add_flag("--quick", gravity_options.quick, "94,648 particles only");
-  gravity->add_option("--states", gravity_options.states, "some of a, b, c, n, f");
+  gravity->add_option("--states", gravity_options.states, "some of a, b, c, n, f, p, q");
   gravity->add_option("--particles", gravity_options.particles, "numbers of particles");
   gravity->add_option("--opening", gravity_options.openings, "tolerances of the tree");
+  gravity->add_flag("--body", gravity_options.body, "net force on the first body at a million particles too: a minute");
   gravity->add_option("--threads", gravity_options.threads, "threads");
   gravity->add_option("--pairs", gravity_options.pairs, "evaluations per setting; the best counts");
   gravity->add_option("--json", gravity_options.json, "file for the results, - for standard output");

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <cmath>
 
+#include "breccia/constants.hpp"
 #include "gravity/mesh/boxes.hpp"
 #include "gravity/method.hpp"
 #include "scene/bodies.hpp"
@@ -55,13 +56,18 @@ gravity::Matter matter_at_start(const Scene& scene) {
   const double spacing = mean_spacing(scene);
   const double cell = scene.gravity.mesh > 0.0 ? scene.gravity.mesh : gravity::kCellsPerSpacing * spacing;
   gravity::Matter matter{.particles = count_particles(scene)};
+  std::vector<gravity::PlacedBody> bodies;
   for (const BodyParameters& b : scene.bodies) {
     if (static_cast<std::int64_t>(b.particles) < gravity::kLeastBoxParticles || b.mass < gravity::kLeastBoxMass * mass)
       continue;
     matter.in_boxes += b.particles;
     matter.mesh_nodes += gravity::mesh_nodes({b.position - b.semi_axes, b.position + b.semi_axes}, cell);
-    ++matter.boxes;
+    bodies.push_back({.particles = b.particles,
+                      .mass = b.mass,
+                      .volume = 4.0 / 3.0 * kPi * b.semi_axes.x * b.semi_axes.y * b.semi_axes.z,
+                      .centre = b.position});
   }
+  matter.bodies = gravity::weigh(bodies, mass);
   return matter;
 }
 
@@ -69,7 +75,8 @@ gravity::Matter matter_at_start(const Scene& scene) {
 gravity::MethodChoice gravity_method(const Scene& scene, const ResolvedEffects& effects) {
   if (!effects.gravity) return {GravityMethod::kOff, ""};
   if (effects.gravity_method != GravityMethod::kAuto) return {effects.gravity_method, ""};
-  return gravity::cheapest_method(matter_at_start(scene), scene.gravity.error);
+  return gravity::cheapest_method(matter_at_start(scene),
+                                  {.error = scene.gravity.error, .opening = scene.gravity.opening});
 }
 
 // One evaluation, from a sample of evenly spread points: the direct sum grows with the square of their number N, tree

@@ -146,6 +146,8 @@ Cloud moved(Cloud cloud, double angle, int shifts) {
 // compared. Bodies on the lattice of a run; a plain cubic one that lies along the mesh beats with it, which gives 1.25
 // times the error in any place (1.45 at 47,000 particles a body).
 TEST(Percentiles, DoNotDependOnPlaceAndDirection) {
+  if (mpi::Comm().size() > 1)
+    GTEST_SKIP() << "more ranks give the same field, as gravity_tree and gravity_tree_pm show";
   Cloud aligned;
   std::mt19937_64 random(31);
   for (const double side : {-1.0, 1.0}) add_fcc_rock(aligned, kBody, {2.0 * side * kRadius, 0, 0}, kRadius, random);
