@@ -36,7 +36,7 @@ def draw(results, path):
         height = [1e3 * r["stages"].get(stage, 0.0) for r in runs]
         below.bar([str(r) for r in ranks], height, bottom=bottom, label=stage)
         bottom = [b + h for b, h in zip(bottom, height)]
-    bytes_axes.plot(ranks, [1e-3 * r["slabs"]["halo_bytes_max"] for r in runs], "o-", label="measured")
+    bytes_axes.plot(ranks, [1e-3 * r["halo_bytes_of_first_step"] for r in runs], "o-", label="measured")
     for axes, what in ((left, "speed-up"), (right, "efficiency"), (bytes_axes, "halo sent by a rank [kB a step]")):
         axes.set_xscale("log", base=2)
         axes.set_xticks(ranks, [str(r) for r in ranks])

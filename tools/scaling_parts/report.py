@@ -39,7 +39,7 @@ def against_model(runs, network):
         said = model.step(case, machine, run["ranks"])
         rows.append({"ranks": run["ranks"], "particles": run["particles"],
                      "measured": sum(stage_seconds(run)), "predicted": said.total,
-                     "measured_halo_bytes": run["slabs"]["halo_bytes_max"], "predicted_halo_bytes": said.halo_bytes})
+                     "measured_halo_bytes": run["halo_bytes_of_first_step"], "predicted_halo_bytes": said.halo_bytes})
     return {"machine": machine.__dict__, "rows": rows}
 
 
