@@ -189,7 +189,8 @@ def violations(scene, out):
         rest = AT_REST[scene.precision] * mass[0] * scene.sound
         if summary["conservation"]["momentum"] > MOMENTUM[scene.precision] and change > rest:
             return "momentum"
-    kinetic, heat = column(rows, "kinetic_energy"), column(rows, "internal_energy")
+    kinetic = [k + a for k, a in zip(column(rows, "kinetic_energy"), column(rows, "affine_energy"))]
+    heat = column(rows, "internal_energy")
     potential = column(rows, "gravitational_energy")
     scale = max(k + abs(e) + abs(u - potential[0]) for k, e, u in zip(kinetic, heat, potential))
     # Without energy the cold work is in no column; what may be gained then is not known.

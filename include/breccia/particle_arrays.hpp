@@ -30,6 +30,7 @@ struct ParticleOutput : ParticleArrays {
   std::vector<double> internal_energy;  ///< specific [J/kg]
   std::vector<double> pressure;         ///< after damage and apex, q included [Pa]
   std::vector<double> shear_stress;     ///< sqrt(J2) of the Cauchy stress [Pa]
+  std::vector<Mat3<double>> gradient;   ///< C^{n+1/2}: what P2G spreads is v + C (x_i - x_p) [1/s]
 };
 
 }  // namespace breccia

@@ -85,8 +85,12 @@ struct NumericsParameters {
   Transfer transfer = Transfer::kAsflip;
   double asflip_alpha = 0.995;
   double asflip_beta = 1.0;
-  int sort_interval = 32;         ///< most steps between two sortings
-  double energy_gain = 0.5;       ///< largest gain of energy over max(kinetic + |potential|)
+  int sort_interval = 32;  ///< most steps between two sortings
+  /// Largest gain of energy over max(kinetic + |potential|). Resolved bodies only lose energy but for rounding and the
+  /// order of the step, 1e-6 in the flagship collision; ASFLIP can make a quarter of a body of few cells that flies
+  /// apart (tests/stability, SpinBeyondBreakUp). Twice as much is neither; an unstable run gains as much as it has
+  /// within a few windows.
+  double energy_gain = 0.5;
   bool lone_without_grid = true;  ///< closed form for particles that share no node with another one
   bool overlap = true;            ///< messages between ranks travel while tiles inside a slab are computed
   bool reproducible = false;      ///< the same bits on any number of ranks

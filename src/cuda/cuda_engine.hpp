@@ -67,8 +67,11 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   void settle();
   void require_memory(const Load& load) const;
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
-  [[nodiscard]] ParticleOutput read_particles(const std::vector<Real>& new_velocity,
-                                              const std::vector<Real>& node_mass) const;
+  // What a probe of the grid says of each particle, component after component; empty vectors without a grid.
+  struct GridView {
+    std::vector<Real> new_velocity, node_mass, gradient;
+  };
+  [[nodiscard]] ParticleOutput read_particles(const GridView& grid) const;
   // On several ranks (cuda_engine_ranks.cpp).
   [[nodiscard]] OwnPlanes own_planes() const;
   void migrate();

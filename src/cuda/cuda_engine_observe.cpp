@@ -61,24 +61,25 @@ ParticleOutput CudaEngine<P>::observe() const {
   const unsigned count = particles_.count();
   DeviceArray<Real> new_velocity(std::size_t{count} * 3);
   DeviceArray<Real> node_mass(count);
+  DeviceArray<Real> gradient(std::size_t{count} * 9);
   ProbeArguments<Real> probe;
   probe.pass = pass_arguments(0.0, 0.0);
   probe.new_velocity = new_velocity.data();
   probe.node_mass = node_mass.data();
+  probe.gradient = gradient.data();
   probe.count = count;
   launch_probe(probe, stream_);
-  const std::vector<Real> after = new_velocity.download(std::size_t{count} * 3, stream_);
-  return read_particles(after, node_mass.download(count, stream_));
+  return read_particles({new_velocity.download(std::size_t{count} * 3, stream_), node_mass.download(count, stream_),
+                         gradient.download(std::size_t{count} * 9, stream_)});
 }
 
 template <class P>
 ParticleOutput CudaEngine<P>::inspect() const {
-  return read_particles({}, {});
+  return read_particles({});
 }
 
 template <class P>
-ParticleOutput CudaEngine<P>::read_particles(const std::vector<Real>& new_velocity,
-                                             const std::vector<Real>& node_mass) const {
+ParticleOutput CudaEngine<P>::read_particles(const GridView& grid) const {
   const std::size_t count = particles_.count();
   const auto low = particles_.template download_component<std::int32_t>("id_low", 0, stream_);
   const auto high = particles_.template download_component<std::int32_t>("id_high", 0, stream_);
@@ -94,15 +95,19 @@ ParticleOutput CudaEngine<P>::read_particles(const std::vector<Real>& new_veloci
   ParticleOutput out;
   for (std::size_t i = 0; i < count; ++i) {
     const auto mean = [&](std::size_t axis) {
-      if (new_velocity.empty()) return before[axis][i];
-      return 0.5 * (before[axis][i] + static_cast<double>(new_velocity[axis * count + i]));
+      if (grid.new_velocity.empty()) return before[axis][i];
+      return 0.5 * (before[axis][i] + static_cast<double>(grid.new_velocity[axis * count + i]));
+    };
+    const auto c = [&](std::size_t n) {
+      return transfer_.affine && !grid.gradient.empty() ? static_cast<double>(grid.gradient[n * count + i]) : 0.0;
     };
     grid::append(out,
                  {.id = static_cast<std::uint32_t>(low[i]) | std::uint64_t{static_cast<std::uint32_t>(high[i])} << 32,
                   .position = position[i],
                   .velocity = {mean(0), mean(1), mean(2)},
                   .mass = mass[i],
-                  .node_mass = node_mass.empty() ? 0.0 : static_cast<double>(node_mass[i]),
+                  .node_mass = grid.node_mass.empty() ? 0.0 : static_cast<double>(grid.node_mass[i]),
+                  .gradient = {c(0), c(1), c(2), c(3), c(4), c(5), c(6), c(7), c(8)},
                   .body_material = static_cast<std::uint32_t>(body_material[i]),
                   .volume_change = volume_change[i],
                   .kirchhoff_pressure = pressure[i],
@@ -111,7 +116,7 @@ ParticleOutput CudaEngine<P>::read_particles(const std::vector<Real>& new_veloci
                   .hencky_norm = strain[i]},
                  setup_);
   }
-  if (node_mass.empty()) out.grid_density.clear();
+  if (grid.node_mass.empty()) out.grid_density.clear();
   return out;
 }
 

@@ -28,12 +28,15 @@ __global__ void __launch_bounds__(kThreads) probe_tiles(ProbeArguments<Real> a) 
   const unsigned tile = blockIdx.x;
   for (unsigned slot = g.first[tile] + threadIdx.x; slot < g.first[tile + 1]; slot += kThreads) {
     Real w[3][3];
+    Real offset[3];
     int start[3];
     for (int axis = 0; axis < 3; ++axis) {
-      weights(offset_in_cells(p.offset[p.at(static_cast<unsigned>(axis), slot)]), w[axis]);
+      offset[axis] = offset_in_cells(p.offset[p.at(static_cast<unsigned>(axis), slot)]);
+      weights(offset[axis], w[axis]);
       start[axis] = stencil_start(p.node[slot], axis);
     }
     Real sums[kSums] = {};
+    Real gradient[9] = {};
     for (int n = 0; n < 27; ++n) {
       const int at[3] = {start[0] + n / 9, start[1] + n / 3 % 3, start[2] + n % 3};
       const unsigned block =
@@ -45,6 +48,13 @@ __global__ void __launch_bounds__(kThreads) probe_tiles(ProbeArguments<Real> a) 
       const Real weight = w[0][n / 9] * w[1][n / 3 % 3] * w[2][n % 3];
       const Real* from = g.velocities + std::size_t{block} * kSums * grid::kBlockNodes + place;
       for (int c = 0; c < kSums; ++c) sums[c] += weight * from[c * grid::kBlockNodes];
+      const int step[3] = {n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
+      for (unsigned row = 0; row < 3; ++row) {
+        const Real velocity = weight * from[(kNewVelocity + static_cast<int>(row)) * grid::kBlockNodes];
+        for (unsigned axis = 0; axis < 3; ++axis) {
+          gradient[3 * row + axis] += velocity * (static_cast<Real>(step[axis]) - offset[axis]);
+        }
+      }
     }
     for (unsigned axis = 0; axis < 3; ++axis) {
       a.new_velocity[axis * a.count + slot] =
@@ -52,10 +62,11 @@ __global__ void __launch_bounds__(kThreads) probe_tiles(ProbeArguments<Real> a) 
           a.pass.transfer.alpha * (p.velocity[p.at(axis, slot)] - sums[kOldVelocity + axis]);
     }
     a.node_mass[slot] = sums[kMass];
+    for (unsigned n = 0; n < 9; ++n) a.gradient[n * a.count + slot] = Real(4) / a.pass.cell * gradient[n];
   }
 }
 
-// v + dt g, and the particle's own mass on its nodes, sum w^2 m.
+// v + dt g, the particle's own mass on its nodes, sum w^2 m, and C of the half step before.
 template <class Real>
 __global__ void __launch_bounds__(kThreads) probe_lone(ProbeArguments<Real> a) {
   const unsigned n = blockIdx.x * kThreads + threadIdx.x;
@@ -72,6 +83,7 @@ __global__ void __launch_bounds__(kThreads) probe_lone(ProbeArguments<Real> a) {
     a.new_velocity[axis * a.count + slot] = p.velocity[p.at(axis, slot)] + a.pass.kick * gravity[axis];
   }
   a.node_mass[slot] = mass;
+  for (unsigned c = 0; c < 9; ++c) a.gradient[c * a.count + slot] = p.velocity_gradient[p.at(c, slot)];
 }
 
 // --- sums and largest values --------------------------------------------------------------------------------------

@@ -11,6 +11,7 @@ struct ProbeArguments {
   PassArguments<Real> pass;
   Real* new_velocity = nullptr;  ///< [3][count] v_p^{n+1/2} [m/s]
   Real* node_mass = nullptr;     ///< [count] sum of w m_i [kg]
+  Real* gradient = nullptr;      ///< [9][count] C^{n+1/2}, row by row [1/s]
   unsigned count = 0;
 };
 template <class Real>

@@ -148,7 +148,7 @@ class HostEngine final : public Engine {
   }
   // Of an observation: what the grid says of each slot; empty vectors without a grid.
   struct GridView {
-    std::vector<Real> new_velocity, node_mass;
+    std::vector<Real> new_velocity, node_mass, gradient;
   };
   [[nodiscard]] GridView probe() const;
   [[nodiscard]] ParticleOutput read_particles(const GridView& grid) const;

@@ -36,15 +36,19 @@ std::uint32_t HostEngine<P>::material(std::size_t slot) const {
 
 template <class P>
 typename HostEngine<P>::GridView HostEngine<P>::probe() const {
-  GridView grid{std::vector<Real>(store_.packs() * kLanes * 3), std::vector<Real>(store_.packs() * kLanes)};
+  const std::size_t slots = store_.packs() * kLanes;
+  GridView grid{std::vector<Real>(3 * slots), std::vector<Real>(slots), std::vector<Real>(9 * slots)};
   ProbeArguments<P> probe;
   probe.tiles = tiles_.data();
   probe.boxes = boxes_.data();
   probe.kinematics = store_.kinematics.data();
+  probe.affine = store_.affine.data();
   probe.velocities = velocities_.data();
   probe.transfer = transfer_;
   probe.new_velocity = grid.new_velocity.data();
   probe.node_mass = grid.node_mass.data();
+  probe.gradient = grid.gradient.data();
+  probe.cell = static_cast<Real>(setup_.cell);
   probe.lone = lone_;
   probe.gravity = setup_.self_gravity ? store_.gravity.data() : nullptr;
   probe.uniform_gravity = {static_cast<Real>(setup_.uniform_gravity.x), static_cast<Real>(setup_.uniform_gravity.y),
@@ -84,6 +88,10 @@ ParticleOutput HostEngine<P>::read_particles(const GridView& grid) const {
       const auto old = static_cast<double>(k.velocity[axis][lane]);
       const auto now = grid.new_velocity.empty() ? old : static_cast<double>(grid.new_velocity[3 * slot + axis]);
       *mean[axis] = 0.5 * (old + now);
+    }
+    if (transfer_.affine && !grid.gradient.empty()) {
+      const auto c = [&](std::size_t n) { return static_cast<double>(grid.gradient[9 * slot + n]); };
+      particle.gradient = {c(0), c(1), c(2), c(3), c(4), c(5), c(6), c(7), c(8)};
     }
     if (store_.has(Group::kDamageLevel)) {
       particle.damage_root = static_cast<double>(store_.damage_level[pack].root[lane]);

@@ -62,6 +62,13 @@ void probe(const ProbeArguments<P>& a, std::uint32_t index) {
                                           alpha * (k.velocity[axis][lane] - grid.value[kOldVelocity + axis][lane]);
       }
       a.node_mass[slot] = grid.value[kMass][lane];
+      const Real c = Real(4) / a.cell;  // as TileGrid::velocity
+      for (std::size_t row = 0; row < 3; ++row) {
+        Real* const gradient = a.gradient + 9 * slot + 3 * row;
+        gradient[0] = c * grid.by_x[row][lane];
+        gradient[1] = c * grid.by_y[row][lane];
+        gradient[2] = c * grid.by_z[row][lane];
+      }
     }
   }
 }

@@ -61,7 +61,8 @@ BRECCIA_HD void pass_over_lone(const PassArguments<P>& a, const Fx& fx, std::uin
   }
 }
 
-/// What a probe of the grid would find: v + dt g, and the particle's own mass on its nodes, sum w^2 m.
+/// What a probe of the grid would find: v + dt g, and the particle's own mass on its nodes, sum w^2 m. C is that of the
+/// half step before, as no kick but that of its own stress changes it.
 template <class P>
 BRECCIA_HD void probe_lone(const ProbeArguments<P>& a) {
   Stencil<P> stencil;
@@ -77,6 +78,7 @@ BRECCIA_HD void probe_lone(const ProbeArguments<P>& a) {
         a.new_velocity[3 * slot + axis] = k.velocity[axis][lane] + a.kick * gravity[axis][lane];
       }
       a.node_mass[slot] = k.mass[lane] * stencil.sum_of_squares(lane);
+      for (std::size_t n9 = 0; n9 < 9; ++n9) a.gradient[9 * slot + n9] = a.affine[pack].gradient[n9][lane];
     }
   }
 }

@@ -24,6 +24,7 @@ void append(ParticleOutput& out, const ObservedParticle& p, const EngineSetup& s
   out.material.push_back(material);
   out.density.push_back(parameters.eos.rho0 / ratio);
   out.grid_density.push_back(p.node_mass / (setup.cell * setup.cell * setup.cell));
+  out.gradient.push_back(p.gradient);
   out.pressure.push_back(p.kirchhoff_pressure / ratio);
   out.damage.push_back(fx.fully_damaged ? 1.0 : p.damage_root * p.damage_root * p.damage_root);
   if (fx.energy) out.internal_energy.push_back(p.energy);

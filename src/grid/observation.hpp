@@ -15,6 +15,7 @@ struct ObservedParticle {
   Vec3d velocity{};                 ///< mean of both half steps [m/s]
   double mass = 0.0;                ///< [kg]
   double node_mass = 0.0;           ///< sum of w m_i [kg]
+  Mat3<double> gradient{};          ///< C^{n+1/2} [1/s]
   std::uint32_t body_material = 0;  ///< body + 65536 * material
   double volume_change = 0.0;       ///< J - 1
   double kirchhoff_pressure = 0.0;  ///< J P [Pa]

@@ -172,10 +172,13 @@ struct ProbeArguments {
   const Tile* tiles = nullptr;
   const TileBox* boxes = nullptr;
   const Kinematics<P>* kinematics = nullptr;
+  const Affine<P>* affine = nullptr;
   const Real* velocities = nullptr;
   TransferParameters transfer;
   Real* new_velocity = nullptr;  ///< [slots][3] v_p^{n+1/2}
   Real* node_mass = nullptr;     ///< [slots] sum of w m_i
+  Real* gradient = nullptr;      ///< [slots][9] C^{n+1/2}, row by row
+  Real cell = 0;
 
   LonePacks lone;
   const HeldGravity<P>* gravity = nullptr;

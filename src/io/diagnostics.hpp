@@ -24,6 +24,7 @@ struct DiagnosticsRow {
   double momentum_x = 0.0, momentum_y = 0.0, momentum_z = 0.0;
   double angular_momentum_x = 0.0, angular_momentum_y = 0.0, angular_momentum_z = 0.0;
   double kinetic_energy = 0.0;
+  double affine_energy = 0.0;
   double internal_energy = 0.0;
   double elastic_energy = 0.0;
   double plastic_energy = 0.0;

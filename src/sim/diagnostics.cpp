@@ -8,11 +8,17 @@
 #include <vector>
 
 #include "breccia/error.hpp"
+#include "grid/setup_choices.hpp"
 
 namespace breccia::sim {
 namespace {
 
 double length(Vec3d v) { return std::sqrt(dot(v, v)); }
+
+double squared_norm(const Mat3<double>& c) {
+  return c.xx * c.xx + c.xy * c.xy + c.xz * c.xz + c.yx * c.yx + c.yy * c.yy + c.yz * c.yz + c.zx * c.zx + c.zy * c.zy +
+         c.zz * c.zz;
+}
 
 // Sums over the particles of one rank; a plain array for one reduction.
 enum Sum {
@@ -24,6 +30,7 @@ enum Sum {
   kLy,
   kLz,
   kKinetic,
+  kAffine,
   kInternal,
   kElastic,
   kPlastic,
@@ -38,7 +45,23 @@ enum Sum {
   kSums
 };
 
+// P2G spreads v + C (x_i - x_p), so that the nodes have the particle's momentum and, as sum w (x_i - x_p)^2 = dx^2/4
+// along each axis, angular momentum m dx^2/4 (C_zy - C_yz, ...) and energy m dx^2/4 C:C / 2 besides. G2P gives
+// particles the share 1 - alpha of the nodes' velocity and alpha of what their own has changed by: without forces the
+// angular momentum with that share of C's stays, and the energy with that share never grows.
+double affine_moment(const Scene& scene) {
+  const grid::TransferParameters transfer = grid::transfer_for(scene.numerics);
+  return transfer.affine ? (1.0 - transfer.alpha) * 0.25 * scene.cell * scene.cell : 0.0;
+}
+
 }  // namespace
+
+Budget::Budget(gravity::Solver* solver, const Scene& scene, const mpi::Comm& comm)
+    : solver_(solver),
+      uniform_gravity_(scene.gravity.uniform),
+      affine_moment_(affine_moment(scene)),
+      comm_(comm),
+      energy_gain_(scene.numerics.energy_gain) {}
 
 std::vector<double> Budget::potential(const ParticleOutput& p) const {
   if (solver_ == nullptr) return {};
@@ -53,7 +76,9 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
   double max_speed = 0.0;
   for (std::size_t i = 0; i < p.size(); ++i) {
     const Vec3d momentum = p.mass[i] * p.velocity[i];
-    const Vec3d angular = cross(p.position[i], momentum);
+    const Mat3<double>& c = p.gradient[i];
+    const Vec3d spin{c.zy - c.yz, c.xz - c.zx, c.yx - c.xy};
+    const Vec3d angular = cross(p.position[i], momentum) + (p.mass[i] * affine_moment_) * spin;
     const double speed = length(p.velocity[i]);
     s[kMass] += p.mass[i];
     s[kPx] += momentum.x;
@@ -63,6 +88,7 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
     s[kLy] += angular.y;
     s[kLz] += angular.z;
     s[kKinetic] += 0.5 * p.mass[i] * speed * speed;
+    s[kAffine] += 0.5 * p.mass[i] * affine_moment_ * squared_norm(c);
     if (!p.internal_energy.empty()) s[kInternal] += p.mass[i] * p.internal_energy[i];
     s[kGravity] -= p.mass[i] * dot(uniform_gravity_, p.position[i]);
     s[kDamaged] += p.mass[i] * p.damage[i];
@@ -92,6 +118,7 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
   row.angular_momentum_y = s[kLy];
   row.angular_momentum_z = s[kLz];
   row.kinetic_energy = s[kKinetic];
+  row.affine_energy = s[kAffine];
   row.internal_energy = s[kInternal];
   row.elastic_energy = s[kElastic];
   row.plastic_energy = s[kPlastic];
@@ -110,7 +137,7 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
     state_.started = true;
   }
   const auto total = [](const io::DiagnosticsRow& r) {
-    return r.kinetic_energy + r.internal_energy + r.gravitational_energy;
+    return r.kinetic_energy + r.affine_energy + r.internal_energy + r.gravitational_energy;
   };
   row.energy_residual = total(row) - total(state_.first);
   require_sums(row);
@@ -120,7 +147,8 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
 }
 
 void Budget::require_sums(const io::DiagnosticsRow& row) const {
-  if (!std::isfinite(row.kinetic_energy + row.internal_energy + row.elastic_energy + row.min_J + row.max_J)) {
+  if (!std::isfinite(row.kinetic_energy + row.affine_energy + row.internal_energy + row.elastic_energy + row.min_J +
+                     row.max_J)) {
     throw NumericsError("a particle is not finite any more: the run is unstable; try a smaller time.step or time.cfl");
   }
   if (row.particles != state_.first.particles) {
@@ -153,7 +181,8 @@ void Budget::follow(const io::DiagnosticsRow& row, double momentum_scale, double
   // Scales are the largest so far: bodies that come to rest must not make an old drift look larger.
   state_.momentum_scale = std::max(state_.momentum_scale, momentum_scale);
   state_.angular_scale = std::max(state_.angular_scale, angular_scale);
-  state_.energy_scale = std::max(state_.energy_scale, row.kinetic_energy + std::abs(row.gravitational_energy));
+  state_.energy_scale =
+      std::max(state_.energy_scale, row.kinetic_energy + row.affine_energy + std::abs(row.gravitational_energy));
   grow(state_.drift.mass, std::abs(row.mass - state_.first.mass), state_.first.mass);
   grow(state_.drift.momentum,
        length({row.momentum_x - state_.first.momentum_x, row.momentum_y - state_.first.momentum_y,

@@ -1,6 +1,7 @@
 // The conservation budget at one time.
 #pragma once
 
+#include "breccia/scene.hpp"
 #include "gravity/solver.hpp"
 #include "grid/engine.hpp"
 #include "io/diagnostics.hpp"
@@ -13,15 +14,8 @@ namespace breccia::sim {
 /// Sums a row over all ranks and follows the drifts from the first row.
 class Budget {
  public:
-  /// What a row may have gained in energy, over the largest kinetic + |potential| so far. Resolved bodies only lose
-  /// energy but for rounding and the order of the step, 1e-6 in the flagship collision; the transfers of a body of few
-  /// cells that flies apart can make a quarter (tests/stability, SpinBeyondBreakUp). Twice as much is neither; an
-  /// unstable run gains as much as it has within a few windows.
-  static constexpr double kEnergyGain = 0.5;
-
-  /// `solver` may be null (no self-gravity). `uniform_gravity` [m/s2].
-  Budget(gravity::Solver* solver, Vec3d uniform_gravity, const mpi::Comm& comm, double energy_gain = kEnergyGain)
-      : solver_(solver), uniform_gravity_(uniform_gravity), comm_(comm), energy_gain_(energy_gain) {}
+  /// `solver` may be null (no self-gravity).
+  Budget(gravity::Solver* solver, const Scene& scene, const mpi::Comm& comm);
 
   /// The row at t_n, after Engine::update_grid(). Collective. Throws NumericsError if a sum is not finite, a particle
   /// or mass is missing or energy was gained; time, step, dt and wall_seconds are left to the caller.
@@ -43,6 +37,7 @@ class Budget {
 
   gravity::Solver* solver_;
   Vec3d uniform_gravity_;
+  double affine_moment_;  // what C carries, for each kg and 1/s [m2]
   mpi::Comm comm_;
   double energy_gain_;
   BudgetState state_;

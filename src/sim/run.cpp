@@ -104,7 +104,7 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   const std::unique_ptr<TimeLoop> owned = make_loop(scene, restart, options.threads, engine.make, comm);
   TimeLoop& loop = *owned;
   print_device(engine, comm);
-  Budget budget(loop.solver(), scene.gravity.uniform, comm, scene.numerics.energy_gain);
+  Budget budget(loop.solver(), scene, comm);
   if (restart) budget.restore(restart->run.budget);
   Output output(scene, options.out, end, restart, budget, comm);
   const double wall_before = restart ? restart->run.output.wall_seconds : 0.0;

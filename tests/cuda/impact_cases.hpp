@@ -90,7 +90,8 @@ inline void advance(Engine& engine, int steps, double dt) {
 }
 
 struct Difference {
-  double position = 0.0, velocity = 0.0, energy = 0.0, damage = 0.0, density = 0.0, grid_density = 0.0, shear = 0.0;
+  double position = 0.0, velocity = 0.0, energy = 0.0, damage = 0.0, density = 0.0, grid_density = 0.0, shear = 0.0,
+         gradient = 0.0;
 };
 
 inline std::vector<std::size_t> by_id(const ParticleOutput& p) {
@@ -114,6 +115,8 @@ inline Difference compare(const ParticleOutput& a, const ParticleOutput& b) {
     grow(d.damage, std::abs(a.damage[i] - b.damage[j]));
     grow(d.density, std::abs(a.density[i] - b.density[j]));
     grow(d.grid_density, std::abs(a.grid_density[i] - b.grid_density[j]));
+    const Mat3<double> c = a.gradient[i], e = b.gradient[j];
+    for (int n = 0; n < 9; ++n) grow(d.gradient, std::abs((&c.xx)[n] - (&e.xx)[n]));
     if (!a.shear_stress.empty()) grow(d.shear, std::abs(a.shear_stress[i] - b.shear_stress[j]));
   }
   for (std::size_t j = 0; j < b.size(); ++j) {
@@ -121,6 +124,7 @@ inline Difference compare(const ParticleOutput& a, const ParticleOutput& b) {
     grow(largest.velocity, std::sqrt(dot(b.velocity[j], b.velocity[j])));
     grow(largest.energy, std::abs(b.internal_energy[j]));
     grow(largest.grid_density, b.grid_density[j]);
+    for (int n = 0; n < 9; ++n) grow(largest.gradient, std::abs((&b.gradient[j].xx)[n]));
     if (!b.shear_stress.empty()) grow(largest.shear, b.shear_stress[j]);
   }
   return {d.position / largest.position,
@@ -129,7 +133,8 @@ inline Difference compare(const ParticleOutput& a, const ParticleOutput& b) {
           d.damage,
           d.density / 2700.0,
           d.grid_density / largest.grid_density,
-          d.shear / largest.shear};
+          d.shear / largest.shear,
+          d.gradient / largest.gradient};
 }
 
 inline constexpr double kStep = 0.15;  // a sixth of what a wave needs for a cell [s]
@@ -144,6 +149,8 @@ inline constexpr double kMixed = 1e-5;
 // Strain is summed from differences of node velocities, which in float carry 1e-7 of 150 m/s: a thousandth of the small
 // shear of rubble.
 inline constexpr double kMixedShear = 1e-3;
+// Likewise the velocity gradient itself: of velocities of 150 m/s, differences of some m/s from cell to cell.
+inline constexpr double kMixedGradient = 1e-4;
 
 inline void expect_below(const Difference& d, Precision precision) {
   const double tolerance = precision == Precision::kDouble ? kDouble : kMixed;
@@ -154,6 +161,7 @@ inline void expect_below(const Difference& d, Precision precision) {
   EXPECT_LE(d.density, tolerance);
   EXPECT_LE(d.grid_density, tolerance);
   EXPECT_LE(d.shear, precision == Precision::kDouble ? kDouble : kMixedShear);
+  EXPECT_LE(d.gradient, precision == Precision::kDouble ? kDouble : kMixedGradient);
 }
 
 }  // namespace breccia::cuda

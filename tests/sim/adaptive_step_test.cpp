@@ -74,7 +74,7 @@ TEST_P(AdaptiveStep, IsShortenedByAShockInsideAWindow) {
     const double limit = stable_step(scene, loop.engine().signal_speeds(), true).seconds / scene.time.cfl;
     EXPECT_LT(loop.dt(), limit) << "step " << loop.step();
     EXPECT_LE(loop.dt(), dt) << "grows inside a window, step " << loop.step();
-    if (!budget) budget.emplace(nullptr, Vec3d{}, mpi::Comm(MPI_COMM_SELF));
+    if (!budget) budget.emplace(nullptr, scene, mpi::Comm(MPI_COMM_SELF));
     const io::DiagnosticsRow row = budget->row(loop.engine(), loop.engine().observe(), loop.lost_work());
     if (loop.step() == 0) first_dt = loop.dt(), kinetic = row.kinetic_energy;
     dt = loop.dt();
@@ -97,7 +97,7 @@ Energies energies(const std::string& precision, const std::string& cfl) {
   simulate(scene, [&](const TimeLoop& loop) {
     const bool last = loop.time() >= 0.35;
     if (loop.step() > 0 && !last) return true;
-    if (!budget) budget.emplace(nullptr, Vec3d{}, mpi::Comm(MPI_COMM_SELF));
+    if (!budget) budget.emplace(nullptr, scene, mpi::Comm(MPI_COMM_SELF));
     row = budget->row(loop.engine(), loop.engine().observe(), loop.lost_work());
     if (loop.step() == 0) first = row;
     return !last;

@@ -26,7 +26,7 @@ TEST(Flagship, LeavesAnElongatedRemnant) {
   simulate(scene, [&](const TimeLoop& loop) {
     const bool last = loop.time() >= 1e4;
     if (loop.step() % 256 != 0 && !last) return true;
-    if (!budget) budget.emplace(loop.solver(), Vec3d{}, self);
+    if (!budget) budget.emplace(loop.solver(), scene, self);
     const ParticleOutput p = loop.engine().observe();
     const io::DiagnosticsRow row = budget->row(loop.engine(), p, loop.lost_work());
     if (row.damaged_fraction == 1.0 && loop.time() < kContact + 60.0) broken_in_time = true;

@@ -41,7 +41,7 @@ inline Course follow(const Scene& scene, const Until& until, const mpi::Comm& co
       [&](const TimeLoop& loop) {
         const bool last = loop.time() >= until.time || loop.step() >= until.steps;
         if (loop.step() % until.every != 0 && !last) return true;
-        if (!budget) budget.emplace(loop.solver(), scene.gravity.uniform, comm, scene.numerics.energy_gain);
+        if (!budget) budget.emplace(loop.solver(), scene, comm);
         ParticleOutput p = loop.engine().observe();
         course.last = budget->row(loop.engine(), p, loop.lost_work());
         if (loop.step() == 0) course.first = course.last;

@@ -130,7 +130,7 @@ TEST(QuietTorture, TurningRubbleKeepsSpinAndShape) {
   simulate(scene, [&](const TimeLoop& loop) {
     const bool start = loop.step() == 16384, stop = loop.time() >= 1e5;
     if (!start && !stop) return true;
-    if (!budget) budget.emplace(loop.solver(), Vec3d{}, mpi::Comm(MPI_COMM_SELF));
+    if (!budget) budget.emplace(loop.solver(), scene, mpi::Comm(MPI_COMM_SELF));
     const ParticleOutput p = loop.engine().observe();
     last = budget->row(loop.engine(), p, loop.lost_work());
     (start ? settled : end) = turning_of(p);

@@ -36,7 +36,7 @@ History bounce(const Scene& scene, double end) {
   simulate(scene, [&](const TimeLoop& loop) {
     const bool last = loop.time() >= end;
     if (loop.step() % 5 != 0 && !last) return true;
-    if (!budget) budget.emplace(nullptr, Vec3d{}, self);
+    if (!budget) budget.emplace(nullptr, scene, self);
     const ParticleOutput p = loop.engine().observe();
     const io::DiagnosticsRow row = budget->row(loop.engine(), p, loop.lost_work());
     if (loop.step() == 0) first = row;
