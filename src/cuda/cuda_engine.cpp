@@ -3,7 +3,6 @@
 #include <cmath>
 
 #include "breccia/error.hpp"
-#include "cuda/observe_kernels.hpp"
 #include "grid/setup_choices.hpp"
 
 namespace breccia::cuda {
@@ -41,6 +40,9 @@ CudaEngine<P>::CudaEngine(const grid::EngineSetup& setup, const mpi::Comm& comm)
   walls_.upload(boundaries_.walls(), stream_);
   counts_.allocate(2);
   counts_.fill_bytes(0, stream_);
+  unbroken_.allocate(1);
+  total_.allocate(1);
+  fastest_.allocate(1);
   prepare_tile_pass<Real>();
 }
 
@@ -162,9 +164,8 @@ void CudaEngine<P>::settle() {
 
 template <class P>
 grid::PassReport CudaEngine<P>::passes() const {
-  DeviceArray<PassSums> total(1);
-  launch_total(pass_sums_.data(), grid_.pass_blocks(), total.data(), stream_);
-  const PassSums sums = total.download(1, stream_)[0];
+  launch_total(pass_sums_.data(), grid_.pass_blocks(), total_.data(), stream_);
+  const PassSums sums = total_.download(1, stream_)[0];
   grid::PassReport report;
   report.plastic_work = sums.plastic_work;
   report.viscous_work = sums.viscous_work;
@@ -202,7 +203,7 @@ template <class P>
 std::unique_ptr<gravity::ResidentSolver> CudaEngine<P>::make_resident_solver(GravityMethod method,
                                                                              const gravity::Parameters& parameters) {
   auto solver = std::make_unique<CudaGravity<Real>>(
-      method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_);
+      method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_, setup_.threads);
   solver->require_memory();
   return solver;
 }
@@ -215,10 +216,9 @@ void CudaEngine<P>::kick_velocities(double time) {
 template <class P>
 bool CudaEngine<P>::finish_damage() {
   if (!setup_.effects.damage) return true;
-  DeviceArray<unsigned> unbroken(1);
-  unbroken.fill_bytes(0, stream_);
-  launch_count_unbroken(particles_.view().damage_root, particles_.count(), unbroken.data(), stream_);
-  if (comm_.any(unbroken.download(1, stream_)[0] != 0)) return false;
+  unbroken_.fill_bytes(0, stream_);
+  launch_count_unbroken(particles_.view().damage_root, particles_.count(), unbroken_.data(), stream_);
+  if (comm_.any(unbroken_.download(1, stream_)[0] != 0)) return false;
   switch_damage_off();
   return true;
 }

@@ -13,6 +13,7 @@
 #include "cuda/device_particles.hpp"
 #include "cuda/halo.hpp"
 #include "cuda/launchers.hpp"
+#include "cuda/observe_kernels.hpp"
 #include "cuda/step_graph.hpp"
 #include "grid/boundary.hpp"
 #include "grid/engine.hpp"
@@ -98,6 +99,10 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   std::vector<float> flaw_thresholds_host_;  // the same: they never change, and go with particles to other ranks
   std::size_t own_flaws_ = 0;                // of them, the others belonging to particles that have gone
   DeviceArray<PassSums> pass_sums_;
+  // What the host asks for once a window: memory that is there already, as to make some would wait for the device.
+  DeviceArray<unsigned> unbroken_;
+  DeviceArray<PassSums> total_;
+  mutable DeviceArray<FastestSignals> fastest_;
   DeviceArray<unsigned> counts_;  // strayed particles; volume changes cut since the last sorting
   Transfer<Real> transfer_{};
   double smallest_mass_ = 0.0;

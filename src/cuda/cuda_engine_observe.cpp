@@ -166,10 +166,9 @@ double CudaEngine<P>::elastic_energy() const {
 
 template <class P>
 grid::SignalSpeeds CudaEngine<P>::signal_speeds() const {
-  DeviceArray<FastestSignals> fastest(1);
-  fastest.fill_bytes(0, stream_);
-  launch_signals(pass_arguments(0.0, 0.0), double_constants_.data(), particles_.count(), fastest.data(), stream_);
-  const FastestSignals found = fastest.download(1, stream_)[0];
+  fastest_.fill_bytes(0, stream_);
+  launch_signals(pass_arguments(0.0, 0.0), double_constants_.data(), particles_.count(), fastest_.data(), stream_);
+  const FastestSignals found = fastest_.download(1, stream_)[0];
   return {comm_.max(std::bit_cast<double>(found.sound)), comm_.max(std::bit_cast<double>(found.particle)),
           comm_.max(std::bit_cast<double>(found.compression))};
 }

@@ -23,7 +23,7 @@ using gravity::Phase;
 
 template <class Real>
 CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles,
-                               const mpi::Comm& comm, cudaStream_t stream)
+                               const mpi::Comm& comm, cudaStream_t stream, int threads)
     : method_(method),
       parameters_(method == GravityMethod::kTreePm || method == GravityMethod::kAuto
                       ? gravity::with_checked_mesh(parameters)
@@ -31,6 +31,7 @@ CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& 
       particles_(std::move(particles)),
       comm_(comm),
       stream_(stream),
+      threads_(threads),
       bodies_(comm, stream),
       sets_(stream),
       unsplit_(comm, stream) {}
@@ -41,7 +42,7 @@ gravity::Layout CudaGravity<Real>::lay_boxes() {
   gravity::Layout layout;
   stats_.phases.time(Phase::kBoxes, [&] {
     const HostBodies own = bodies_.own_on_host();
-    layout = gravity::lay_boxes({own.position, own.mass}, parameters_.mesh, comm_, 1);
+    layout = gravity::lay_boxes({own.position, own.mass}, parameters_.mesh, comm_, threads_);
   });
   return layout;
 }

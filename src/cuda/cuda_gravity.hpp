@@ -19,7 +19,7 @@ class CudaGravity final : public gravity::ResidentSolver {
   using Particles = std::function<PredictArguments<Real>(double time)>;
 
   CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles, const mpi::Comm& comm,
-              cudaStream_t stream);
+              cudaStream_t stream, int threads);
 
   /// Throws UsageError on all ranks if the device has not the memory that an evaluation takes with the particles where
   /// they are. Collective.
@@ -42,6 +42,7 @@ class CudaGravity final : public gravity::ResidentSolver {
   Particles particles_;
   mpi::Comm comm_;
   cudaStream_t stream_;
+  int threads_;  // of the host
   gravity::Stats stats_;
   GravityBodies<Real> bodies_;
   BodySets sets_;

@@ -5,6 +5,7 @@
 
 #include "breccia/error.hpp"
 #include "cuda/check.hpp"
+#include "cuda/device_particles.hpp"
 #include "cuda/step_arguments.hpp"
 #include "mpi/together.hpp"
 
@@ -50,9 +51,9 @@ std::string gigabytes(std::uint64_t bytes) {
 template <class P>
 std::uint64_t bytes_needed(std::size_t record, const Load& load) {
   constexpr std::uint64_t real = sizeof(typename P::Real);
-  // Beside its fields: one of them while all are rearranged, keys and order of the sorting twice, four numbers of its
+  // Beside its fields: some of them while all are rearranged, keys and order of the sorting twice, four numbers of its
   // run, places in hash tables of up to four entries.
-  constexpr std::uint64_t sorting = 8 + 2 * (8 + 8 + 4) + 4 * 4 + 8 + 4 * 12;
+  constexpr std::uint64_t sorting = kRearrangedBytes + 2 * (8 + 8 + 4) + 4 * 4 + 8 + 4 * 12;
   constexpr std::uint64_t tile_hash = 2 * 2 * 27 * 12;
   constexpr std::uint64_t tile = kSums * kTileNodes * real + 27 * sizeof(grid::BlockKey) + sizeof(PassSums) + 8;
   constexpr std::uint64_t block = kSums * grid::kBlockNodes * real + 27 * sizeof(unsigned);

@@ -41,12 +41,10 @@ void DeviceParticles<P>::allocate(std::size_t count) {
   if (count > 0xffffffffU / 9) throw NumericsError("a device holds at most 477 million particles: use more ranks");
   count_ = static_cast<unsigned>(count);
   stride_ = count_;
-  std::size_t widest = 0;
   for (Field& field : fields_) {
     field.data.allocate(count * word_bytes(*field.descriptor) * components(*field.descriptor));
-    widest = std::max(widest, word_bytes(*field.descriptor));
   }
-  scratch_.allocate(count * widest);
+  scratch_.allocate(count * kRearrangedBytes);
 }
 
 template <class P>
@@ -136,15 +134,27 @@ std::vector<T> DeviceParticles<P>::download_component(std::string_view name, int
 
 template <class P>
 void DeviceParticles<P>::rearrange(const unsigned* source, cudaStream_t stream) {
-  if (count_ == 0) return;
+  static_assert(kRearrangedBytes / sizeof(std::uint32_t) <= Planes::kMost);
+  Planes there, back;
+  const auto move = [&] {
+    launch_gather(there, source, count_, stream);
+    launch_gather(back, nullptr, count_, stream);
+    there = back = {};
+  };
   for (Field& field : fields_) {
-    const std::size_t bytes = count_ * word_bytes(*field.descriptor);
+    const std::size_t word = word_bytes(*field.descriptor);
     for (std::size_t c = 0; c < components(*field.descriptor); ++c) {
+      const std::size_t bytes = word * count_;
+      const bool full = static_cast<std::size_t>(there.count + 1) * word > kRearrangedBytes;
+      if (there.count > 0 && (full || there.word_bytes != field.descriptor->element_bytes)) move();
+      there.word_bytes = back.word_bytes = field.descriptor->element_bytes;
       std::byte* plane = field.data.data() + c * bytes;
-      launch_gather_words(plane, scratch_.data(), source, count_, field.descriptor->element_bytes, stream);
-      check(cudaMemcpyAsync(plane, scratch_.data(), bytes, cudaMemcpyDeviceToDevice, stream), "copy");
+      std::byte* aside = scratch_.data() + static_cast<std::size_t>(there.count) * bytes;
+      there.add(plane, aside);
+      back.add(aside, plane);
     }
   }
+  move();
 }
 
 template <class P>
@@ -175,8 +185,9 @@ std::vector<std::byte> DeviceParticles<P>::extract(std::span<const unsigned> slo
   for (const Field& field : fields_) {
     const std::size_t word = word_bytes(*field.descriptor);
     for (std::size_t c = 0; c < components(*field.descriptor); ++c, place += word) {
-      launch_gather_words(field.data.data() + c * count_ * word, scratch_.data(), source.data(),
-                          static_cast<unsigned>(slots.size()), field.descriptor->element_bytes, stream);
+      Planes planes{.word_bytes = field.descriptor->element_bytes};
+      planes.add(field.data.data() + c * count_ * word, scratch_.data());
+      launch_gather(planes, source.data(), static_cast<unsigned>(slots.size()), stream);
       const std::vector<std::byte> plane = scratch_.download(slots.size() * word, stream);
       for (std::size_t i = 0; i < slots.size(); ++i) {
         std::memcpy(records.data() + i * record + place, plane.data() + i * word, word);
@@ -201,10 +212,9 @@ void DeviceParticles<P>::replace(std::span<const unsigned> slots, std::span<cons
     DeviceArray<std::byte> data(count * word * components(*field.descriptor));
     for (std::size_t c = 0; c < components(*field.descriptor); ++c, place += word) {
       std::byte* to = data.data() + c * count * word;
-      if (!slots.empty()) {
-        launch_gather_words(field.data.data() + c * count_ * word, to, source.data(),
-                            static_cast<unsigned>(slots.size()), field.descriptor->element_bytes, stream);
-      }
+      Planes planes{.word_bytes = field.descriptor->element_bytes};
+      planes.add(field.data.data() + c * count_ * word, to);
+      launch_gather(planes, source.data(), static_cast<unsigned>(slots.size()), stream);
       if (arrivals == 0) continue;
       plane.resize(arrivals * word);
       for (std::size_t i = 0; i < arrivals; ++i) {
@@ -218,7 +228,7 @@ void DeviceParticles<P>::replace(std::span<const unsigned> slots, std::span<cons
   }
   count_ = static_cast<unsigned>(count);
   stride_ = count_;
-  scratch_.reserve(count * sizeof(double));
+  scratch_.reserve(count * kRearrangedBytes);
 }
 
 template <class P>

@@ -11,6 +11,9 @@
 
 namespace breccia::cuda {
 
+/// Of each particle, so many bytes are rearranged at once and need room beside it.
+inline constexpr std::size_t kRearrangedBytes = 32;
+
 template <class P>
 class DeviceParticles {
  public:

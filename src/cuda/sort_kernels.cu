@@ -169,9 +169,15 @@ __global__ void list_tiles(Runs runs, unsigned tiles, unsigned* tile_first, Bloc
 }
 
 template <class Word>
-__global__ void gather_words(const Word* from, Word* to, const unsigned* source, unsigned count) {
+__global__ void gather(Planes planes, const unsigned* source, unsigned count) {
   const unsigned i = thread_in_grid(blockIdx.x, threadIdx.x);
-  if (i < count) to[i] = from[source[i]];
+  if (i >= count) return;
+  const unsigned from = source == nullptr ? i : source[i];
+  BRECCIA_UNROLL(8)  // an index that is known: the list stays where the launch put it
+  for (int c = 0; c < Planes::kMost; ++c) {
+    if (c >= planes.count) break;
+    static_cast<Word*>(planes.to[c])[i] = static_cast<const Word*>(planes.from[c])[from];
+  }
 }
 
 // --- blocks ---------------------------------------------------------------------------------------------------------
@@ -295,14 +301,12 @@ void launch_list_tiles(const Runs& runs, unsigned tiles, unsigned* tile_first, B
   launched();
 }
 
-void launch_gather_words(const void* from, void* to, const unsigned* source, unsigned count, int word_bytes,
-                         cudaStream_t stream) {
-  if (word_bytes == 4) {
-    BRECCIA_LAUNCH(gather_words<std::uint32_t>, grid_for(count), dim3(kThreads), 0, stream,
-                   static_cast<const std::uint32_t*>(from), static_cast<std::uint32_t*>(to), source, count);
+void launch_gather(const Planes& planes, const unsigned* source, unsigned count, cudaStream_t stream) {
+  if (count == 0) return;
+  if (planes.word_bytes == 4) {
+    BRECCIA_LAUNCH(gather<std::uint32_t>, grid_for(count), dim3(kThreads), 0, stream, planes, source, count);
   } else {
-    BRECCIA_LAUNCH(gather_words<std::uint64_t>, grid_for(count), dim3(kThreads), 0, stream,
-                   static_cast<const std::uint64_t*>(from), static_cast<std::uint64_t*>(to), source, count);
+    BRECCIA_LAUNCH(gather<std::uint64_t>, grid_for(count), dim3(kThreads), 0, stream, planes, source, count);
   }
   launched();
 }

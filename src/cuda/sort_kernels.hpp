@@ -63,9 +63,21 @@ void launch_arrange(const Runs& runs, const unsigned* order, unsigned tiled_part
                     grid::BlockKey* key_of_slot, cudaStream_t stream);
 void launch_list_tiles(const Runs& runs, unsigned tiles, unsigned* tile_first, grid::BlockKey* block_keys,
                        cudaStream_t stream);
-/// to[slot] := from[source[slot]]; words of 4 or 8 bytes.
-void launch_gather_words(const void* from, void* to, const unsigned* source, unsigned count, int word_bytes,
-                         cudaStream_t stream);
+/// Components of particles, `word_bytes` (4 or 8) each, that one kernel moves.
+struct Planes {
+  static constexpr int kMost = 8;
+  const void* from[kMost] = {};
+  void* to[kMost] = {};
+  int count = 0;
+  int word_bytes = 0;
+
+  void add(const void* source, void* target) {
+    from[count] = source;
+    to[count++] = target;
+  }
+};
+/// to[c][i] := from[c][source[i]], or from[c][i] if there is no source.
+void launch_gather(const Planes& planes, const unsigned* source, unsigned count, cudaStream_t stream);
 
 /// Adds the blocks that a tile's particles can reach until the next sorting to hash and block_keys, counts them.
 void launch_reach(const unsigned* tile_first, unsigned tiles, const std::int32_t* node,
