@@ -73,6 +73,29 @@ def disturb(runner, out, wait, length, everyone, random_source):
     return None, took, bool(ranks)
 
 
+def disturbed(runner, out, planned, at_end, length, random_source):
+    """Kills the run in `out` so many times. Returns what was wrong, how many there were, and the longest wait after one."""
+    trouble, done, longest = [], 0, 0.0
+    for _ in range(planned):
+        everyone = not at_end and random_source.random() < 0.5
+        wait = wait_for_end if at_end else wait_for_moment
+        problem, took, found = disturb(runner, out, wait, length, everyone, random_source)
+        done += found or not at_end
+        longest = max(longest, took)
+        if problem:
+            trouble.append(problem)
+    return trouble, done, longest
+
+
+def finished_otherwise(runner, out, whole):
+    """Lets the run in `out` end and tells what is not as in the one that nobody disturbed."""
+    code, errors = runner.finish(out, "--restart", "auto")
+    if code != 0:
+        return [f"the last restart failed with exit code {code}: {errors.strip().splitlines()[-1:]}"]
+    different = runs.differences(whole, runs.results(out))
+    return [f"the results differ in {', '.join(different)}"] if different else []
+
+
 def run(root, options):
     quick = options.quick
     count = 10 if quick else getattr(options, "count", 200)
@@ -98,23 +121,14 @@ def run(root, options):
     while kills < count:
         out = folder / f"round{rounds}"
         rounds += 1
-        trouble = []
         if at_end:
             shutil.copytree(folder / "near", out)
         # Several kills on the way of one run: a checkpoint of a continued run is one like any other.
-        for _ in range(1 if at_end else min(random_source.randint(1, 4), count - kills)):
-            everyone = not at_end and random_source.random() < 0.5
-            wait = wait_for_end if at_end else wait_for_moment
-            problem, took, found = disturb(runner, out, wait, length, everyone, random_source)
-            kills += found or not at_end
-            longest = max(longest, took)
-            if problem:
-                trouble.append(problem)
-        code, errors = runner.finish(out, "--restart", "auto")
-        if code != 0:
-            trouble.append(f"the last restart failed with exit code {code}: {errors.strip().splitlines()[-1:]}")
-        elif different := runs.differences(whole, runs.results(out)):
-            trouble.append(f"the results differ in {', '.join(different)}")
+        planned = 1 if at_end else min(random_source.randint(1, 4), count - kills)
+        trouble, done, took = disturbed(runner, out, planned, at_end, length, random_source)
+        kills += done
+        longest = max(longest, took)
+        trouble += finished_otherwise(runner, out, whole)
         if trouble:
             findings += 1
             print(f"{out}: {'; '.join(trouble)}", flush=True)
