@@ -4,13 +4,6 @@
 
 namespace breccia::mpi {
 
-Environment::Environment(int* argc, char*** argv) {
-  int provided = 0;
-  MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &provided);
-}
-
-Environment::~Environment() { MPI_Finalize(); }
-
 template <>
 MPI_Datatype datatype<double>() {
   return MPI_DOUBLE;

@@ -3,7 +3,6 @@
 #include <fmt/core.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cstdio>
 #include <exception>
 #include <string>
@@ -15,9 +14,6 @@
 namespace breccia::cli {
 namespace {
 
-/// How long a failed rank waits for the others to end: an error that all ranks share reaches them at about the same
-/// time, ranks that wait for this one in a collective call never end by themselves.
-constexpr std::chrono::seconds kPatience{10};
 constexpr int kDefect = 1;
 
 struct Outcome {
@@ -50,9 +46,9 @@ void print_error(const Outcome& outcome, int rank) {
   fmt::print(stderr, "breccia: {}{}{}\n", kind, where, line);
 }
 
-/// True once `request` is complete; false if that takes longer than kPatience.
-bool completes_in_time(MPI_Request& request) {
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+/// True once `request` is complete; false if that takes longer than `patience`.
+bool completes_within(std::chrono::seconds patience, MPI_Request& request) {
+  const auto deadline = std::chrono::steady_clock::now() + patience;
   int done = 0;
   MPI_Test(&request, &done, MPI_STATUS_IGNORE);
   while (done == 0 && std::chrono::steady_clock::now() < deadline) {
@@ -64,7 +60,7 @@ bool completes_in_time(MPI_Request& request) {
 
 }  // namespace
 
-int exit_status(const std::function<void()>& command, const mpi::Comm& comm) {
+int exit_status(const std::function<void()>& command, const mpi::Comm& comm, std::chrono::seconds patience) {
   // An own communicator: the ranks may have left `comm` in the middle of different collective calls.
   MPI_Comm ending = MPI_COMM_NULL;
   MPI_Comm_dup(comm.handle(), &ending);
@@ -75,7 +71,7 @@ int exit_status(const std::function<void()>& command, const mpi::Comm& comm) {
   MPI_Iallgather(&mine.code, 1, MPI_INT, codes.data(), 1, MPI_INT, ending, &request);
   if (mine.code == 0) {
     MPI_Wait(&request, MPI_STATUS_IGNORE);
-  } else if (!completes_in_time(request)) {
+  } else if (!completes_within(patience, request)) {
     print_error(mine, comm.rank());
     MPI_Abort(comm.handle(), mine.code);
   }

@@ -29,6 +29,10 @@ class ExitStatus(unittest.TestCase):
     def test_other_exceptions_are_defects(self):
         self.assert_ends(self.run_failing("defect", 1), 1, "breccia: error: internal error: two lines")
 
+    def test_a_rank_is_lost_at_the_very_end(self):
+        line = "rank 0: the end of all other ranks did not come within 1 s; one was killed or hangs"
+        self.assert_ends(self.run_failing("lost"), 1, f"breccia: error: {line}")
+
     def test_success(self):
         process = self.run_failing("none")
         self.assertEqual((process.returncode, process.stderr), (0, ""))

@@ -8,7 +8,7 @@ import subprocess
 import time
 from pathlib import Path
 
-PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "scontrol", "squeue")
+PROGRAMS = ("munged", "slurmctld", "slurmd", "sbatch", "scancel", "scontrol", "squeue")
 
 
 def missing():
@@ -38,6 +38,7 @@ class PrivateSlurm:
         self.folder = Path(folder)
         self.cpus = cpus
         self.daemons = []
+        self.is_up = False
 
     def __enter__(self):
         try:
@@ -52,6 +53,22 @@ class PrivateSlurm:
         self.stop()
 
     def stop(self):
+        try:
+            if self.is_up:
+                self._cancel_jobs()
+        finally:
+            self._stop_daemons()
+
+    def _cancel_jobs(self):
+        """A job's processes are nobody's children: they would outlive the daemons."""
+        def jobs():
+            return self.run("squeue", "--noheader", "--format=%A").split()
+
+        if jobs():
+            self.run("scancel", *jobs())
+            self._wait(lambda: not jobs(), "the end of jobs")
+
+    def _stop_daemons(self):
         for process in reversed(self.daemons):
             process.terminate()
         for process in self.daemons:
@@ -83,7 +100,7 @@ class PrivateSlurm:
             if condition():
                 return
             time.sleep(0.2)
-        raise RuntimeError(f"Slurm: {what} did not come up; see {self.folder}")
+        raise RuntimeError(f"Slurm: waited a minute for {what}; see {self.folder}")
 
     def _start_munge(self):
         munge = self.folder / "munge"
@@ -139,6 +156,7 @@ PartitionName=main Nodes={host} Default=YES MaxTime=INFINITE State=UP
         self._daemon(shutil.which("slurmctld"), "-D")
         self._daemon(shutil.which("slurmd"), "-D")
         self._wait(self._node_is_idle, "the node")
+        self.is_up = True
 
     def _node_is_idle(self):
         try:

@@ -10,12 +10,25 @@ namespace breccia::sim::test {
 
 inline constexpr double kBodyRadius = 50e3;
 
+/// What a scene begins with: cells [m], steps [s], and an end that no test comes to.
+inline std::string scene_of(double cell, double step) {
+  return "[scene]\nend = \"1e5 s\"\n[grid]\ncell = \"" + metres(cell) + "\"\n[time]\nstep = \"" + seconds(step) +
+         "\"\n";
+}
+
+/// A spinning ellipsoid that flies along x, its long axis, half of which is `length`: a cell in ten steps, out of all
+/// slabs that were cut for it.
+inline std::string flying_body(const std::string& length) {
+  return scene_of(1e3, 0.05) + "[[body]]\nshape = \"ellipsoid\"\naxes = [\"" + length + R"(", "3 km", "3 km"]
+velocity = ["2 km/s", 0, 0]
+spin = [0, "0.01 rad/s", "0.02 rad/s"]
+)";
+}
+
 /// Spheres of 100 km that meet at 200 m/s and 15 degrees, 6 km before contact: forces start at a gap of a cell. The
 /// step is the same part of a cell as in the flagship run.
 inline std::string collision(double cell) {
-  return "[scene]\nend = \"1e5 s\"\n[grid]\ncell = \"" + metres(cell) + "\"\n[time]\nstep = \"" +
-         seconds(cell / 2500.0 * 0.1220703125) + R"("
-[[body]]
+  return scene_of(cell, cell / 2500.0 * 0.1220703125) + R"([[body]]
 shape = "sphere"
 radius = "50 km"
 [[body]]
@@ -46,13 +59,7 @@ inline std::string periodic_slide(int blocks, int axis = 0) {
   const auto vector = [axis](const std::string& a, const std::string& b, const std::string& c) {
     return from_axis(axis, {a, b, c});
   };
-  return R"([scene]
-end = "1000 s"
-[grid]
-cell = "1 km"
-[time]
-step = "0.05 s"
-[[body]]
+  return scene_of(1e3, 0.05) + R"([[body]]
 shape = "box"
 lattice = "cubic"
 spacing = "500 m"

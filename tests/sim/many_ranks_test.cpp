@@ -98,13 +98,7 @@ TEST(ManyRanks, TreePm) { expect_same({"effects.gravity=treepm"}, 1e-7); }
 // ranks that own nothing.
 TEST(ManyRanks, PastRanksThatOwnNothing) {
   const mpi::Comm comm;
-  const Scene scene = load(R"([scene]
-end = "1000 s"
-[grid]
-cell = "1 km"
-[time]
-step = "0.05 s"
-[[body]]
+  const Scene scene = load(scene_of(1e3, 0.05) + R"([[body]]
 shape = "sphere"
 radius = "4 km"
 velocity = ["2 km/s", 0, 0]

@@ -45,24 +45,8 @@ TEST(Ranks, OneParticleEach) {
   EXPECT_EQ(work.busy_ranks, std::min(2, ranks()));
 }
 
-// A spinning body that flies 20 cells, out of all slabs that were cut for it at the start.
 TEST(Ranks, BodyThatLeavesItsSlabs) {
-  const Scene scene = load(R"([scene]
-end = "1000 s"
-[grid]
-cell = "1 km"
-[time]
-step = "0.05 s"
-[[body]]
-shape = "ellipsoid"
-axes = ["8 km", "3 km", "3 km"]
-velocity = ["2 km/s", 0, 0]
-spin = [0, "0.01 rad/s", "0.02 rad/s"]
-[effects]
-gravity = "direct"
-[numerics]
-precision = "double"
-)");
+  const Scene scene = load(flying_body("8 km"), {"effects.gravity=direct", "numerics.precision=double"});
   const Work work = expect_same_as_one_rank(scene, {36e3, 2000.0});
   EXPECT_TRUE(ranks() == 1 || work.migrated > 100) << work.migrated;
 }

@@ -100,13 +100,7 @@ TEST_P(Reproducible, CutAcrossThePlanesOfTiles) {
     all.emplace_back(velocity);
     all.emplace_back(along_y ? R"(body[0].axes=["8 km", "20 km", "9 km"])"
                              : R"(body[0].axes=["8 km", "9 km", "45 km"])");
-    expect_same(R"([scene]
-end = "1000 s"
-[grid]
-cell = "2.5 km"
-[time]
-step = "0.1 s"
-[[body]]
+    expect_same(scene_of(2.5e3, 0.1) + R"([[body]]
 shape = "ellipsoid"
 axes = ["20 km", "8 km", "9 km"]
 spin = ["0.002 rad/s", "0.001 rad/s", 0]
@@ -117,13 +111,7 @@ spin = ["0.002 rad/s", "0.001 rad/s", 0]
 
 // Debris that flies through all slabs, most of it without grid; some of it meets.
 TEST_P(Reproducible, DebrisThatNeedsNoGrid) {
-  const std::vector<State> states = expect_same(R"([scene]
-end = "1000 s"
-[grid]
-cell = "2 km"
-[time]
-step = "0.1 s"
-[[body]]
+  const std::vector<State> states = expect_same(scene_of(2e3, 0.1) + R"([[body]]
 shape = "ellipsoid"
 axes = ["20 km", "9 km", "8 km"]
 [[body]]
@@ -141,21 +129,7 @@ spin = [0, "0.02 rad/s", 0]
   EXPECT_LT(states.front().lone, 290U);
 }
 
-TEST_P(Reproducible, BodyThatLeavesItsSlabs) {
-  expect_same(R"([scene]
-end = "1000 s"
-[grid]
-cell = "1 km"
-[time]
-step = "0.05 s"
-[[body]]
-shape = "ellipsoid"
-axes = ["8 km", "3 km", "3 km"]
-velocity = ["2 km/s", 0, 0]
-spin = [0, "0.01 rad/s", "0.02 rad/s"]
-)",
-              keys(), {160, 80});
-}
+TEST_P(Reproducible, BodyThatLeavesItsSlabs) { expect_same(flying_body("8 km"), keys(), {160, 80}); }
 
 TEST_P(Reproducible, SlidingThroughAPeriodicAxis) {
   for (const int blocks : {1, 2, 3}) expect_same(periodic_slide(blocks), keys(), {40, 20});

@@ -34,8 +34,23 @@ class Model(unittest.TestCase):
                        for a in (-margin, margin) for b in (-margin, margin)}
                 self.assertEqual(model.columns(radius, margin), len(met), (radius, margin))
         self.assertEqual(model.columns(-1.0, 2), 0)
+        # Rows of blocks y = -2 ... 1, each with the stacks z = -1 and 0.
+        self.assertEqual(model.columns(6.0, 0, stack=4), 8)
         # For large discs: area, and margin and blocks around it.
         self.assertAlmostEqual(model.columns(400.0, 2) / ((math.pi * 400**2 + 32 * 400) / 16), 1.0, delta=0.01)
+
+    def test_a_thin_cap_is_there_as_often_as_it_holds_a_layer(self):
+        case = model.Case(3e5)
+        last = math.floor(0.5 * case.apart + case.radius)
+        for plane in (last - 40, last - 1, last):
+            height = min(1.0, 0.5 * case.apart + case.radius - plane + 0.5)
+            layers = height / case.layers
+            found = [model.widest(case, plane, plane, (n + 0.5) / 16) > 0.0 for n in range(16)]
+            self.assertAlmostEqual(sum(found) / 16, min(layers, 1.0), delta=1 / 16)
+        # Through the centre of a sphere nothing is wider.
+        middle = round(0.5 * case.apart)
+        self.assertEqual(model.widest(case, middle, middle, 0.3), case.radius + model.RIM)
+        self.assertEqual(model.mean_columns(case, middle, middle, 2), model.columns(case.radius + model.RIM, 2))
 
     def test_a_block_that_is_cut_costs_both_sides(self):
         planes = model.Planes(-2, [0, 1, 2, 3, 4, 5], {-1: 10, 0: 20})
@@ -81,10 +96,13 @@ class Model(unittest.TestCase):
         self.assertAlmostEqual(bytes_of[1] / bytes_of[0], 4.0, delta=0.25)
 
     def test_halo_is_that_of_the_program(self):
-        # Bytes that the rank with the most sent in a step, without gravity.
-        for particles, ranks, sent in ((20000, 4, 154112), (94648, 2, 41984), (94648, 4, 330752), (300000, 4, 506368)):
-            said = model.step(model.Case(particles, interval=0), dataclasses.replace(PLAIN, tile=1.5e-6), ranks)
-            self.assertAlmostEqual(said.halo_bytes / sent, 1.0, delta=0.1)
+        # Bytes that the rank with the most sent in the first step, and the weights by which it was cut.
+        core = dataclasses.replace(PLAIN, tile=model.TILE * PLAIN.particle)
+        for particles, of_two, of_four in ((20000, 28672, 154112), (94648, 41984, 330752), (300000, 48640, 506368),
+                                           (1000000, 55296, 1145344)):
+            for ranks, sent in ((2, of_two), (4, of_four)):
+                said = model.step(model.Case(particles, interval=0), core, ranks)
+                self.assertAlmostEqual(sent / said.halo_bytes, 1.0, delta=0.08, msg=(particles, ranks))
 
     def test_latency_and_bandwidth(self):
         case = model.Case(1e8, interval=0)
@@ -120,7 +138,7 @@ class Model(unittest.TestCase):
             model.least_squares([[1.0, 2.0], [2.0, 4.0]], [1.0, 2.0])
 
     def test_predictions_name_all_ranks(self):
-        lines = report.predictions(model.H100)
+        lines = report.predictions(model.H100, sizes=(1e6,))
         self.assertEqual([int(line.split()[0]) for line in lines[2:]], [2**k for k in range(11)])
 
 

@@ -6,6 +6,7 @@ the flagship impact. Cells are the unit of length, seconds that of time. docs/sc
 
 import bisect
 import dataclasses
+import functools
 import itertools
 import math
 
@@ -15,8 +16,13 @@ CHANNELS = 8  # values of a node that travel
 # 20,000 to 1,000,000 particles. Half a cell of particles without gaps; a cell of one or two has none where it holds little
 # of the sphere.
 RIM = 0.25
+# Where the layers of a body's lattice lie is not known to the model: means over so many places, evenly spaced.
+PHASES = 16
 MARGIN = 2  # nodes that a particle reaches beyond the nearest one until the next sorting
-TILE = 16.0  # particles that cost as much as a block does by its share of a tile, on a host core (breccia_bench work)
+STACK = 4  # blocks of a tile of the host engine, along z
+# Particles that cost as much as a tile does with its half empty last pack, on a host core: 2.0 us and 8 lanes of 37.5 ns, by
+# which the program cuts (docs/scaling.md, "Balance").
+TILE = 61.0
 # Share of a padded mesh that a transposition moves: halves that are zero stay where they are. From the bytes that four
 # ranks sent (docs/performance.md): 12.9 MB an evaluation at 1e6 particles.
 TRANSPOSED = 0.4
@@ -38,6 +44,7 @@ class Machine:
     word: int = 4  # bytes of a grid value
     hidden: float = 0.0  # share of the halo's time that interior work hides
     whole_blocks: bool = False  # slabs are cut between blocks only
+    stack: int = STACK  # blocks of a tile
 
 
 @dataclasses.dataclass(frozen=True)
@@ -59,6 +66,11 @@ class Case:
     def apart(self):
         """Centre to centre [cells]."""
         return 2.0 * self.radius * (1.0 + self.gap)
+
+    @property
+    def layers(self):
+        """Between layers of particles, of the face-centred cubic lattice that bodies are made of [cells]."""
+        return 0.5 * (4.0 / self.per_cell) ** (1.0 / 3.0)
 
 
 def centres(case):
@@ -82,30 +94,39 @@ def cells_up_to(case, x):
     return sum(cap(x - (centre - case.radius)) for centre in centres(case))
 
 
-def widest(case, first, last):
-    """Radius of the disc of nodes that have particles nearest to them, on that of the planes first ... last where it is
-    largest; -1: none has."""
-    sphere = case.radius + RIM
+def widest(case, first, last, phase):
+    """Radius of the disc of nodes that have particles nearest to them, in that layer of particles nearest to the planes first
+    ... last where it is largest; -1: there is none. Layers lie `phase` of their distance beside the centres."""
     radius = -1.0
     for centre in centres(case):
-        away = max(first - centre, centre - last, 0.0)
-        if away <= sphere:
-            radius = max(radius, math.sqrt(sphere**2 - away**2))
+        near = max(first - 0.5 - centre, centre - last - 0.5, 0.0)
+        away = (math.ceil(near / case.layers - phase) + phase) * case.layers if near else 0.0
+        if away <= case.radius:
+            radius = max(radius, math.sqrt(case.radius**2 - away**2) + RIM)
     return radius
 
 
-def columns(radius, margin):
+def columns(radius, margin, stack=1):
     """Columns of blocks across the slabs that nodes meet which lie in a disc around the origin, or `margin` nodes beside
-    it. Counted row by row: for large discs the area and half the perimeter of a square around it, 8 radius blocks."""
+    it, in stacks of `stack` blocks along one side. Counted row by row: for large discs the area and half the perimeter of a
+    square around it, 8 radius blocks."""
     if radius < 0.0:
         return 0
     count = 0
+    height = BLOCK * stack
     reach = math.floor(radius) + margin
     for row in range(-reach // BLOCK, reach // BLOCK + 1):
         nearest = max(0, BLOCK * row - margin, -(BLOCK * row + BLOCK - 1) - margin)
         end = math.floor(math.sqrt(max(0.0, radius**2 - nearest**2))) + margin
-        count += end // BLOCK - -end // BLOCK + 1
+        count += end // height - -end // height + 1
     return count
+
+
+@functools.lru_cache(maxsize=None)
+def mean_columns(case, first, last, margin, stack=1):
+    """Columns that particles nearest to the planes first ... last meet, on average over where layers lie."""
+    phases = ((n + 0.5) / PHASES for n in range(PHASES))
+    return sum(columns(widest(case, first, last, phase), margin, stack) for phase in phases) / PHASES
 
 
 @dataclasses.dataclass
@@ -130,7 +151,7 @@ class Planes:
         return self.before[end] - self.before[begin] + tiles
 
 
-def planes_with_work(case, particle, tile, step=1):
+def planes_with_work(case, particle, tile, step=1, stack=STACK):
     first, last = planes_of(case)
     first -= first % step
     last += -(last + 1) % step
@@ -138,7 +159,7 @@ def planes_with_work(case, particle, tile, step=1):
     for plane in range(first, last + 1, step):
         cells = cells_up_to(case, plane + step - 0.5) - cells_up_to(case, plane - 0.5)
         before.append(before[-1] + particle * case.per_cell * cells)
-    tiles = {b: tile * columns(widest(case, BLOCK * b, BLOCK * b + BLOCK - 1), 0)
+    tiles = {b: tile * mean_columns(case, BLOCK * b, BLOCK * b + BLOCK - 1, 0, stack)
              for b in range(first // BLOCK, last // BLOCK + 1)}
     return Planes(first, before, tiles, step)
 
@@ -182,8 +203,8 @@ def halo_bytes(case, at, word):
     reach behind it, and velocities of its own that particles there reach."""
     found = 0
     for depth in range(MARGIN):
-        found += columns(widest(case, at - MARGIN + depth, at - 1), MARGIN)  # particles below, nodes of at + depth
-        found += columns(widest(case, at, at + MARGIN - 1 - depth), MARGIN)
+        found += mean_columns(case, at - MARGIN + depth, at - 1, MARGIN)  # particles below, nodes of at + depth
+        found += mean_columns(case, at, at + MARGIN - 1 - depth, MARGIN)
     return found * BLOCK**2 * CHANNELS * word
 
 
@@ -228,7 +249,7 @@ def gravity_seconds(case, machine, ranks, share):
 def step(case, machine, ranks):
     """The step of `case` on `ranks` ranks."""
     particle = machine.particle + (machine.gravity_particle / case.interval if case.interval else 0.0)
-    planes = planes_with_work(case, particle, machine.tile, BLOCK if machine.whole_blocks else 1)
+    planes = planes_with_work(case, particle, machine.tile, BLOCK if machine.whole_blocks else 1, machine.stack)
     ends = [0, *cuts(planes, ranks), len(planes.before) - 1]
     slabs = list(zip(ends, ends[1:]))
     shares = [planes.work(*slab) for slab in slabs]
@@ -321,4 +342,5 @@ H100 = Machine(
     gravity_node=0.15e-9,
     hidden=0.8,
     whole_blocks=True,
+    stack=1,
 )

@@ -1,0 +1,46 @@
+// Start and end of MPI.
+#include <unistd.h>
+
+#include <csignal>
+#include <cstdio>
+#include <cstring>
+
+#include "mpi/comm.hpp"
+#include "mpi/ending.hpp"
+
+namespace breccia::mpi {
+namespace {
+
+std::chrono::seconds patience{20};
+
+// What a rank says that waits in vain: made before, as a signal handler may do little more than write it.
+char last_words[128] = "";
+
+extern "C" void give_up(int) {
+  // Nobody is left to tell that this failed.
+  [[maybe_unused]] const auto written = write(STDERR_FILENO, last_words, std::strlen(last_words));
+  _exit(1);
+}
+
+}  // namespace
+
+void set_patience_at_end(std::chrono::seconds seconds) { patience = seconds; }
+
+Environment::Environment(int* argc, char*** argv) {
+  int provided = 0;
+  MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &provided);
+}
+
+Environment::~Environment() {
+  const long long seconds = patience.count();
+  std::snprintf(
+      last_words, sizeof last_words,
+      "breccia: error: rank %d: the end of all other ranks did not come within %lld s; one was killed or hangs\n",
+      Comm().rank(), seconds);
+  std::signal(SIGALRM, give_up);
+  alarm(static_cast<unsigned>(seconds));
+  MPI_Finalize();
+  alarm(0);
+}
+
+}  // namespace breccia::mpi
