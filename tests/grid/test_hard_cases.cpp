@@ -77,6 +77,10 @@ void expect_straight(Precision precision, bool lone_without_grid) {
     for (const double b : offsets)
       x.push_back(Vec3d{(a + far) * kCell, (b - far) * kCell, (a - b) * kCell}), far += 40.0;
   }
+  // The node across the corner gets delta^6 / 8 of the mass: from what a float still holds, 1e-38, to nothing.
+  for (double delta = 1e-9; delta < 2e-8; delta *= 1.25, far += 40.0) {
+    x.push_back(kCell * Vec3d{0.5 - delta + far, 0.5 - delta - far, 0.5 - delta});
+  }
   const std::vector<Vec3d> v(x.size(), Vec3d{3.0, -100.0, 0.25});
   const mpi::Comm comm;
   const auto engine = engine_with(setup_for(precision, lone_without_grid), x, v, comm);
