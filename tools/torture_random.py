@@ -26,8 +26,10 @@ AT_REST = {"mixed": 1e-8, "double": 1e-15}  # of total mass times sound speed: r
 # Of the largest kinetic + thermal + potential energy. What ASFLIP heats in half-empty cells beyond what motion loses
 # (docs/verification.md) reaches ten percent in bodies of two cells, 24 in rubble that flies apart and meets again; a step
 # that is unstable gains without bound. The potential itself is known to gravity.error, 3.5e-4 and mostly the same from row to row: 1e-4
-# of it is the floor.
+# of it is the floor. Without C (FLIP) and where C keeps what forces did to it (APIC) nothing of the kind is gained: 9e-6
+# in the first 170 scenes, from what self-gravity is held over a window.
 ENERGY = 0.3
+ENERGY_KEPT = 1e-3
 
 
 class Scene:
@@ -167,7 +169,13 @@ def column(rows, name):
     return [float(row[key]) for row in rows]
 
 
-def violations(scene, out):
+def energy_bound(text):
+    """Of the scene's transfer; 0 of asflip_alpha is APIC."""
+    kept = ('transfer = "apic"', 'transfer = "flip"', "asflip_alpha = 0")
+    return ENERGY_KEPT if any(line in kept for line in text.splitlines()) else ENERGY
+
+
+def violations(scene, text, out):
     """What a finished run did not keep, as words."""
     with open(out / "diagnostics.csv", newline="", encoding="utf-8") as file:
         rows = list(csv.DictReader(file))
@@ -195,7 +203,7 @@ def violations(scene, out):
     scale = max(k + abs(e) + abs(u - potential[0]) for k, e, u in zip(kinetic, heat, potential))
     # Without energy the cold work is in no column; what may be gained then is not known.
     floor = 1e-4 * max(map(abs, potential))
-    if scene.energy and max(column(rows, "energy_residual")) > ENERGY * scale + floor:
+    if scene.energy and max(column(rows, "energy_residual")) > energy_bound(text) * scale + floor:
         return "energy gained"
     return ""
 
@@ -217,7 +225,7 @@ def try_scene(root, scene, text):
             return "refused: " + done.stderr.strip()[:200]
         if done.returncode != 0:
             return f"exit code {done.returncode}: " + done.stderr.strip()[:300]
-        return violations(scene, out)
+        return violations(scene, text, out)
 
 
 def kind_of(wrong):

@@ -134,14 +134,16 @@ void CudaEngine<P>::update_grid(double kick) {
 }
 
 template <class P>
-void CudaEngine<P>::sort() {
+double CudaEngine<P>::sort() {
   if (comm_.any(strayed())) {
     throw NumericsError(
         "particles moved more than a cell between two sortings, or are not finite: the run is unstable (try a smaller "
         "time.step), or numerics.sort_interval is too long for its speeds");
   }
+  const double work = work_of_periods();
   migrate();
   settle();
+  return work;
 }
 
 template <class P>

@@ -33,7 +33,8 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   [[nodiscard]] EngineState save() const override;
   [[nodiscard]] material::FlawLists flaws() const override;
   void restore(const EngineState& state, const material::FlawLists& flaws) override;
-  void sort() override;
+  double sort() override;
+  [[nodiscard]] double work_beyond_period() const override;
   [[nodiscard]] const mpi::Slabs& slabs() const override { return slabs_; }
   [[nodiscard]] mpi::PlaneWork work(std::span<const double> more) const override;
   void cut(const mpi::Slabs& slabs) override;
@@ -82,6 +83,8 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   void drop_flaws_of_others();
   void save_flaws(EngineState& state) const;
   void switch_damage_off();
+  [[nodiscard]] double work_of_periods() const;  // of the uniform field, before particles are put back
+  [[nodiscard]] std::vector<Vec3d> unfolded_positions() const;
   [[nodiscard]] std::vector<Vec3d> positions() const;
   [[nodiscard]] std::vector<double> hencky_norms() const;
   [[nodiscard]] std::vector<double> component(const char* field, int index) const;

@@ -16,7 +16,7 @@ std::vector<double> CudaEngine<P>::component(const char* field, int index) const
 }
 
 template <class P>
-std::vector<Vec3d> CudaEngine<P>::positions() const {
+std::vector<Vec3d> CudaEngine<P>::unfolded_positions() const {
   const auto keys = grid_.block_keys_of_particles(stream_);
   const auto packed = particles_.template download_component<std::int32_t>("node", 0, stream_);
   std::vector<double> x[3];
@@ -30,10 +30,46 @@ std::vector<Vec3d> CudaEngine<P>::positions() const {
     }
   }
   std::vector<Vec3d> positions;
-  for (std::size_t i = 0; i < keys.size(); ++i) {
-    positions.push_back(boundaries_.into_period({x[0][i], x[1][i], x[2][i]}));
-  }
+  for (std::size_t i = 0; i < keys.size(); ++i) positions.push_back({x[0][i], x[1][i], x[2][i]});
   return positions;
+}
+
+template <class P>
+std::vector<Vec3d> CudaEngine<P>::positions() const {
+  std::vector<Vec3d> positions = unfolded_positions();
+  for (Vec3d& x : positions) x = boundaries_.into_period(x);
+  return positions;
+}
+
+// Both sums on the host: few scenes have a field along a periodic axis, and the sum is the same in every run.
+template <class P>
+double CudaEngine<P>::work_of_periods() const {
+  if (!boundaries_.repeats_along(setup_.uniform_gravity)) return 0.0;
+  const auto keys = grid_.block_keys_of_particles(stream_);
+  const auto packed = particles_.template download_component<std::int32_t>("node", 0, stream_);
+  const std::vector<double> mass = component("mass", 0);
+  double work = 0.0;
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    std::int32_t node[3];
+    for (int axis = 0; axis < 3; ++axis) {
+      node[axis] = grid::kBlockWidth * grid::component(grid::block_coord(keys[i]), axis) +
+                   (packed[i] >> (8 * axis) & 255) - grid::kNodeBias;
+    }
+    work += mass[i] * dot(setup_.uniform_gravity, boundaries_.put_back(node));
+  }
+  return work;
+}
+
+template <class P>
+double CudaEngine<P>::work_beyond_period() const {
+  if (!boundaries_.repeats_along(setup_.uniform_gravity)) return 0.0;
+  const std::vector<Vec3d> position = unfolded_positions();
+  const std::vector<double> mass = component("mass", 0);
+  double work = 0.0;
+  for (std::size_t i = 0; i < position.size(); ++i) {
+    work += mass[i] * dot(setup_.uniform_gravity, position[i] - boundaries_.into_period(position[i]));
+  }
+  return work;
 }
 
 template <class P>

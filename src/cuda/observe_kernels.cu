@@ -66,7 +66,7 @@ __global__ void __launch_bounds__(kThreads) probe_tiles(ProbeArguments<Real> a) 
   }
 }
 
-// v + dt g, the particle's own mass on its nodes, sum w^2 m, and C of the half step before.
+// v + dt g, the particle's own mass on its nodes, sum w^2 m, and C with the kick of its own stress.
 template <class Real>
 __global__ void __launch_bounds__(kThreads) probe_lone(ProbeArguments<Real> a) {
   const unsigned n = blockIdx.x * kThreads + threadIdx.x;
@@ -83,7 +83,11 @@ __global__ void __launch_bounds__(kThreads) probe_lone(ProbeArguments<Real> a) {
     a.new_velocity[axis * a.count + slot] = p.velocity[p.at(axis, slot)] + a.pass.kick * gravity[axis];
   }
   a.node_mass[slot] = mass;
-  for (unsigned c = 0; c < 9; ++c) a.gradient[c * a.count + slot] = p.velocity_gradient[p.at(c, slot)];
+  constexpr unsigned rate_of[9] = {0, 3, 4, 3, 1, 5, 4, 5, 2};  // among xx, yy, zz, xy, xz, yz
+  for (unsigned c = 0; c < 9; ++c) {
+    a.gradient[c * a.count + slot] =
+        p.velocity_gradient[p.at(c, slot)] - a.pass.kick * a.pass.lone_pull[rate_of[c] * a.pass.lone + n];
+  }
 }
 
 // --- sums and largest values --------------------------------------------------------------------------------------

@@ -75,6 +75,19 @@ void BoundarySet::apply(std::span<const WallNode> nodes, Real* velocities) const
 template void BoundarySet::apply(std::span<const WallNode>, float*) const;
 template void BoundarySet::apply(std::span<const WallNode>, double*) const;
 
+bool BoundarySet::repeats_along(Vec3d field) const {
+  const Vec3d length = period_length();
+  return field.x * length.x != 0.0 || field.y * length.y != 0.0 || field.z * length.z != 0.0;
+}
+
+Vec3d BoundarySet::put_back(const std::int32_t (&node)[3]) const {
+  const auto moved = [&](int axis) {
+    const std::int32_t block = node[axis] >> 2;
+    return kBlockWidth * cell_ * (block - periodicity_.wrap(block, axis));
+  };
+  return {moved(0), moved(1), moved(2)};
+}
+
 Vec3d BoundarySet::into_period(Vec3d x) const {
   const Vec3d lengths = period_length();
   for (int axis = 0; axis < 3; ++axis) {

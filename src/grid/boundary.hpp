@@ -38,6 +38,10 @@ class BoundarySet {
   void apply_to_rest(Real* velocities) const {
     apply(rest_, velocities);
   }
+  /// Whether a field repeats: it points along a periodic axis, and has no potential there.
+  [[nodiscard]] bool repeats_along(Vec3d field) const;
+  /// How far a particle at this node moves when sorting puts it back into the period: x before less x after [m].
+  [[nodiscard]] Vec3d put_back(const std::int32_t (&node)[3]) const;
   /// The position moved into the period of the periodic axes.
   [[nodiscard]] Vec3d into_period(Vec3d x) const;
   /// Where the period of each axis starts, and its length; 0: it does not repeat [m].

@@ -109,8 +109,12 @@ class Engine {
   virtual void restore(const EngineState& state, const material::FlawLists& flaws) = 0;
 
   /// Sorts particles into tiles, sends those that left the slab to their owner, rebuilds blocks and halo. Only between
-  /// gather() and scatter(). Collective.
-  virtual void sort() = 0;
+  /// gather() and scatter(). Collective. Returns the work of the uniform field on particles of this rank over the
+  /// periods by which they are put back: m g L for each that has fallen through one of length L [J].
+  virtual double sort() = 0;
+  /// That of particles which lie beyond their period now: observe() shows them inside, sort() has not put them
+  /// back [J].
+  [[nodiscard]] virtual double work_beyond_period() const = 0;
 
   /// How the grid is cut. insert() cuts for equal numbers of particles, sort() leaves cuts as they are.
   [[nodiscard]] virtual const mpi::Slabs& slabs() const = 0;

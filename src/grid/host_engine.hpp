@@ -40,7 +40,8 @@ class HostEngine final : public Engine {
   [[nodiscard]] EngineState save() const override;
   [[nodiscard]] material::FlawLists flaws() const override;
   void restore(const EngineState& state, const material::FlawLists& flaws) override;
-  void sort() override;
+  double sort() override;
+  [[nodiscard]] double work_beyond_period() const override;
   [[nodiscard]] const mpi::Slabs& slabs() const override { return slabs_; }
   [[nodiscard]] mpi::PlaneWork work(std::span<const double> more) const override;
   void cut(const mpi::Slabs& slabs) override;
@@ -99,6 +100,7 @@ class HostEngine final : public Engine {
   void settle(std::vector<Placement> placements);
   void choose_slabs(std::span<const Placement> placements);
   [[nodiscard]] Placement place(std::size_t slot, BlockCoord stack) const;  // of a particle that has moved
+  [[nodiscard]] double work_of_periods() const;  // of the uniform field, before particles are put back
   [[nodiscard]] std::vector<Placement> place_all() const;
   void migrate(std::vector<Placement>& placements);
   [[nodiscard]] std::vector<char> find_lone(Occupancy& occupancy) const;  // for each block of it
@@ -153,7 +155,12 @@ class HostEngine final : public Engine {
   [[nodiscard]] GridView probe() const;
   [[nodiscard]] ParticleOutput read_particles(const GridView& grid) const;
   [[nodiscard]] ParticleSample sample(std::size_t slot, BlockCoord block) const;
+  [[nodiscard]] Placement node_of(std::size_t slot, BlockCoord stack) const;  // not put back into a period
+  [[nodiscard]] Vec3d unfolded_position(std::size_t slot, BlockCoord block) const;
   [[nodiscard]] Vec3d position(std::size_t slot, BlockCoord block) const;
+  [[nodiscard]] double mass(std::size_t slot) const {
+    return static_cast<double>(store_.kinematics[slot / kLanes].mass[static_cast<int>(slot % kLanes)]);
+  }
   [[nodiscard]] std::uint64_t id(std::size_t slot) const;
   [[nodiscard]] std::uint32_t material(std::size_t slot) const;
   [[nodiscard]] double hencky_norm(std::size_t slot) const;  // |dev h| of the elastic strain

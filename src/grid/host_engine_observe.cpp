@@ -8,16 +8,32 @@
 namespace breccia::grid {
 
 template <class P>
-Vec3d HostEngine<P>::position(std::size_t slot, BlockCoord block) const {
+Vec3d HostEngine<P>::unfolded_position(std::size_t slot, BlockCoord block) const {
   const Kinematics<P>& k = store_.kinematics[slot / kLanes];
   const int lane = static_cast<int>(slot % kLanes);
+  const Placement at = node_of(slot, block);
   double x[3];
   for (int axis = 0; axis < 3; ++axis) {
-    const int node = kBlockWidth * component(block, axis) + ((k.node[lane] >> (8 * axis)) & 255) - kNodeBias;
     const double scale = sizeof(typename P::Offset) == 4 ? 0x1p-32 : 1.0;
-    x[axis] = setup_.cell * (node + scale * static_cast<double>(k.offset[axis][lane]));
+    x[axis] = setup_.cell * (at.node[axis] + scale * static_cast<double>(k.offset[axis][lane]));
   }
-  return boundaries_.into_period({x[0], x[1], x[2]});
+  return {x[0], x[1], x[2]};
+}
+
+template <class P>
+Vec3d HostEngine<P>::position(std::size_t slot, BlockCoord block) const {
+  return boundaries_.into_period(unfolded_position(slot, block));
+}
+
+template <class P>
+double HostEngine<P>::work_beyond_period() const {
+  if (!boundaries_.repeats_along(setup_.uniform_gravity)) return 0.0;
+  double work = 0.0;
+  for_each_particle([&](std::size_t slot, BlockCoord block) {
+    const Vec3d x = unfolded_position(slot, block);
+    work += mass(slot) * dot(setup_.uniform_gravity, x - boundaries_.into_period(x));
+  });
+  return work;
 }
 
 template <class P>
@@ -50,6 +66,7 @@ typename HostEngine<P>::GridView HostEngine<P>::probe() const {
   probe.gradient = grid.gradient.data();
   probe.cell = static_cast<Real>(setup_.cell);
   probe.lone = lone_;
+  probe.lone_pull = lone_pull_.data();
   probe.gravity = setup_.self_gravity ? store_.gravity.data() : nullptr;
   probe.uniform_gravity = {static_cast<Real>(setup_.uniform_gravity.x), static_cast<Real>(setup_.uniform_gravity.y),
                            static_cast<Real>(setup_.uniform_gravity.z)};

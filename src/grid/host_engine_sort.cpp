@@ -36,11 +36,20 @@ using mpi::put;
 }  // namespace
 
 template <class P>
-Placement HostEngine<P>::place(std::size_t slot, BlockCoord stack) const {
+Placement HostEngine<P>::node_of(std::size_t slot, BlockCoord stack) const {
   const std::int32_t packed = store_.kinematics[slot / kLanes].node[static_cast<int>(slot % kLanes)];
   Placement p{static_cast<std::uint32_t>(slot), {}};
   for (int axis = 0; axis < 3; ++axis) {
-    const std::int32_t node = kBlockWidth * component(stack, axis) + ((packed >> (8 * axis)) & 255) - kNodeBias;
+    p.node[axis] = kBlockWidth * component(stack, axis) + ((packed >> (8 * axis)) & 255) - kNodeBias;
+  }
+  return p;
+}
+
+template <class P>
+Placement HostEngine<P>::place(std::size_t slot, BlockCoord stack) const {
+  Placement p = node_of(slot, stack);
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::int32_t node = p.node[axis];
     p.node[axis] = kBlockWidth * periodicity_.wrap(floor_div4(node), axis) + (node & 3);
   }
   return p;
@@ -72,11 +81,24 @@ std::vector<Placement> HostEngine<P>::place_all() const {
 }
 
 template <class P>
-void HostEngine<P>::sort() {
+double HostEngine<P>::work_of_periods() const {
+  if (!boundaries_.repeats_along(setup_.uniform_gravity)) return 0.0;
+  double work = 0.0;
+  for_each_particle([&](std::size_t slot, BlockCoord stack) {
+    const Vec3d moved = boundaries_.put_back(node_of(slot, stack).node);
+    work += mass(slot) * dot(setup_.uniform_gravity, moved);
+  });
+  return work;
+}
+
+template <class P>
+double HostEngine<P>::sort() {
   if (comm_.any(strayed())) throw NumericsError("particles moved more than a cell between two sortings");
   std::vector<Placement> placements;
   mpi::together<NumericsError>(comm_, [&] { placements = place_all(); });
+  const double work = work_of_periods();
   settle(std::move(placements));
+  return work;
 }
 
 template <class P>

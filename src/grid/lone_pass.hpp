@@ -61,8 +61,8 @@ BRECCIA_HD void pass_over_lone(const PassArguments<P>& a, const Fx& fx, std::uin
   }
 }
 
-/// What a probe of the grid would find: v + dt g, and the particle's own mass on its nodes, sum w^2 m. C is that of the
-/// half step before, as no kick but that of its own stress changes it.
+/// What a probe of the grid would find: v + dt g, C with the kick of its own stress, and the particle's own mass on its
+/// nodes, sum w^2 m.
 template <class P>
 BRECCIA_HD void probe_lone(const ProbeArguments<P>& a) {
   Stencil<P> stencil;
@@ -71,6 +71,8 @@ BRECCIA_HD void probe_lone(const ProbeArguments<P>& a) {
     const Kinematics<P>& k = a.kinematics[pack];
     const Vec3<typename P::RealPack> g = gravity_of<P>(a, pack);
     const typename P::RealPack gravity[3] = {g.x, g.y, g.z};
+    const Sym3<typename P::RealPack>& r = a.lone_pull[n].rate;
+    const typename P::RealPack rate[9] = {r.xx, r.xy, r.xz, r.xy, r.yy, r.yz, r.xz, r.yz, r.zz};
     stencil.set(k);
     for (int lane = 0; lane < lanes_in(a.lone, n, P::kLanes); ++lane) {
       const std::size_t slot = pack * P::kLanes + static_cast<std::size_t>(lane);
@@ -78,7 +80,9 @@ BRECCIA_HD void probe_lone(const ProbeArguments<P>& a) {
         a.new_velocity[3 * slot + axis] = k.velocity[axis][lane] + a.kick * gravity[axis][lane];
       }
       a.node_mass[slot] = k.mass[lane] * stencil.sum_of_squares(lane);
-      for (std::size_t n9 = 0; n9 < 9; ++n9) a.gradient[9 * slot + n9] = a.affine[pack].gradient[n9][lane];
+      for (std::size_t n9 = 0; n9 < 9; ++n9) {
+        a.gradient[9 * slot + n9] = a.affine[pack].gradient[n9][lane] - a.kick * rate[n9][lane];
+      }
     }
   }
 }

@@ -181,6 +181,7 @@ struct ProbeArguments {
   Real cell = 0;
 
   LonePacks lone;
+  const LonePull<P>* lone_pull = nullptr;
   const HeldGravity<P>* gravity = nullptr;
   Vec3<Real> uniform_gravity{};
   Real kick = 0;

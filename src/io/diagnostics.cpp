@@ -42,7 +42,10 @@ const std::array kColumns{
     DiagnosticsColumn{"plastic_energy", "J", "dissipated by yielding since the start", &Row::plastic_energy},
     DiagnosticsColumn{"viscous_energy", "J", "dissipated by artificial viscosity since the start",
                       &Row::viscous_energy},
-    DiagnosticsColumn{"gravitational_energy", "J", "potential energy of self-gravity", &Row::gravitational_energy},
+    DiagnosticsColumn{"gravitational_energy", "J",
+                      "potential energy of self-gravity and of the uniform field; matter that goes through a periodic "
+                      "plane falls on",
+                      &Row::gravitational_energy},
     DiagnosticsColumn{"energy_residual", "J", "what the energy budget misses since the start", &Row::energy_residual},
     DiagnosticsColumn{"max_speed", "m/s", "largest particle speed", &Row::max_speed},
     DiagnosticsColumn{"min_J", "1", "smallest volume ratio J", &Row::min_J},

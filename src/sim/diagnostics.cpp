@@ -98,6 +98,7 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
   }
   const std::vector<double> self_gravity = potential(p);
   for (std::size_t i = 0; i < self_gravity.size(); ++i) s[kGravity] += 0.5 * p.mass[i] * self_gravity[i];
+  s[kGravity] -= lost.periods + engine.work_beyond_period();
   s[kElastic] = engine.elastic_energy();
   s[kPlastic] = lost.plastic;
   s[kViscous] = lost.viscous;

@@ -48,9 +48,11 @@ Json row_json(const io::DiagnosticsRow& row) {
   return json;
 }
 
+// Affine energy and work over periods were not counted by programs that wrote the same format: 0 there.
 io::DiagnosticsRow row_from(const Json& json) {
   io::DiagnosticsRow row;
   for (const io::DiagnosticsColumn& column : io::diagnostics_columns()) {
+    if (std::string_view(column.name) == "affine_energy" && !json.contains(column.name)) continue;
     std::visit([&](auto member) { read(json.at(column.name), row.*member); }, column.value);
   }
   return row;
@@ -76,7 +78,7 @@ BalanceState balance_from(const Json& json) {
 
 Json loop_json(const LoopState& loop) {
   Json lost = Json::array();
-  for (const LostWork& work : loop.lost) lost.push_back({work.plastic, work.viscous, work.clamped});
+  for (const LostWork& work : loop.lost) lost.push_back({work.plastic, work.viscous, work.clamped, work.periods});
   return {{"time", loop.time},
           {"dt", loop.dt},
           {"previous_dt", loop.previous_dt},
@@ -94,7 +96,8 @@ LoopState loop_from(const Json& json) {
   read(json.at("step"), loop.step);
   read(json.at("sort_interval"), loop.sort_interval);
   for (const Json& work : json.at("lost_work")) {
-    loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>(), whole<std::uint64_t>(work.at(2))});
+    loop.lost.push_back({work.at(0).get<double>(), work.at(1).get<double>(), whole<std::uint64_t>(work.at(2)),
+                         work.size() > 3 ? work.at(3).get<double>() : 0.0});
   }
   loop.balance = balance_from(json.at("balance"));
   const bool steps = loop.dt > 0.0 && loop.previous_dt > 0.0 && std::isfinite(loop.dt + loop.previous_dt);

@@ -13,11 +13,12 @@
 
 namespace breccia::sim {
 
-/// What was lost since the start, of this rank.
+/// What the particles do not tell of the energy since the start, of this rank.
 struct LostWork {
   double plastic = 0.0;       ///< work turned to heat by yielding [J]
   double viscous = 0.0;       ///< and by artificial viscosity [J]
   std::uint64_t clamped = 0;  ///< volume changes that were cut (PassReport::clamped)
+  double periods = 0.0;       ///< work of the uniform field over the periods that matter was put back by [J]
 };
 
 /// Of the balance of loads, since the start or since the number of ranks changed. Imbalance is the largest over the

@@ -18,6 +18,7 @@ LostWork sum_of(const std::vector<LostWork>& ranks) {
     sum.plastic += work.plastic;
     sum.viscous += work.viscous;
     sum.clamped += work.clamped;
+    sum.periods += work.periods;
   }
   return sum;
 }
@@ -34,6 +35,7 @@ TimeLoop::TimeLoop(const Scene& scene, const ResolvedEffects& effects, int threa
       window_(scene.gravity.interval),
       guard_(scene, step_at_rest(scene, effects), comm),
       balance_(scene, comm) {
+  lost_.periods = -engine_->work_beyond_period();  // of matter that the start itself has put back
   const grid::SignalSpeeds speeds = engine_->signal_speeds();
   dt_ = previous_dt_ = stable_step(scene_, speeds, viscosity_).seconds;
   set_sort_interval(speeds.particle * dt_ / scene_.cell);
@@ -135,7 +137,7 @@ void TimeLoop::between_steps() {
   lost_ = lost_work();
   const double largest_move = comm_.max(passes.largest_move);
   timers_("damage", [&] { engine_->finish_damage(); });
-  timers_("sort", [&] { engine_->sort(); });
+  timers_("sort", [&] { lost_.periods += engine_->sort(); });
   if (window_.due()) {
     begin_window();
   } else if (adaptive_) {
@@ -202,7 +204,8 @@ void TimeLoop::check() {
 
 LostWork TimeLoop::lost_work() const {
   const grid::PassReport passes = engine_->passes();
-  return {lost_.plastic + passes.plastic_work, lost_.viscous + passes.viscous_work, lost_.clamped + passes.clamped};
+  return {lost_.plastic + passes.plastic_work, lost_.viscous + passes.viscous_work, lost_.clamped + passes.clamped,
+          lost_.periods};
 }
 
 void TimeLoop::set_sort_interval(double cells_per_step) {

@@ -16,10 +16,10 @@ Sym3<double> second_moment(const std::vector<Vec3d>& points) {
 }
 
 // Rotation by an angle about (1, 1, 1), a direction in which nothing is aligned with the axes.
-Vec3d turned(Vec3d p) {
+Vec3d turned(Vec3d p, double angle = 0.7) {
   const double third = 1.0 / 3.0;
-  const double c = std::cos(0.7);
-  const double s = std::sin(0.7) / std::sqrt(3.0);
+  const double c = std::cos(angle);
+  const double s = std::sin(angle) / std::sqrt(3.0);
   const double along = third * (p.x + p.y + p.z) * (1.0 - c);
   return Vec3d{along, along, along} + c * p + s * cross(Vec3d{1, 1, 1}, p);
 }
@@ -82,6 +82,12 @@ TEST(Ellipsoid, LineAndPlate) {
   EXPECT_EQ(of(line).c_over_a, 0.0);
   EXPECT_EQ(of(plate).c_over_a, 0.0);
   EXPECT_NEAR(of(plate).b_over_a, 0.9, 1e-3);
+  // Turned otherwise, the smallest eigenvalues are roundings of either sign.
+  for (int n = 0; n < 50; ++n) {
+    std::vector<Vec3d> small;
+    for (int i = 0; i < 36; ++i) small.push_back(turned({100.0 * (i % 6), 100.0 * (i / 6), 0}, 0.1 + 0.06 * n));
+    EXPECT_EQ(of(small).c_over_a, 0.0) << n;
+  }
 }
 
 TEST(Classify, FollowsTheOrderOfThePaper) {

@@ -123,6 +123,16 @@ TEST(Orbit, LimitsAreFinite) {
   EXPECT_NEAR(dot(rest.velocity, rest.velocity), 0.0, 1e-6);
   EXPECT_TRUE(std::isfinite(rest.time_to_contact));
 
+  // The root's argument is then a rounding of either sign: starts from rest everywhere, and pericentres at contact.
+  for (int n = 1; n <= 200; ++n) {
+    const double far = (1.0 + 0.02 * n) * kContact;
+    const ImpactOrbit fall =
+        back_calculate(impact(std::sqrt(2.0 * kMu * (1.0 / kContact - 1.0 / far)), 0.0, far), kContact, kMu);
+    EXPECT_TRUE(std::isfinite(fall.velocity.x + fall.position.x + fall.time_to_contact)) << n;
+    const ImpactOrbit near = back_calculate(impact(90.0 + n, 90.0, kContact), kContact, kMu);
+    EXPECT_TRUE(std::isfinite(near.velocity.x + near.position.x)) << n;
+  }
+
   const ImpactOrbit grazing = back_calculate(impact(100.0, 90.0), kContact, kMu);
   const double speed = std::sqrt(1.0e4 - 2.0 * kMu * (1.0 / kContact - 1.0 / (4.0 * kRadius)));
   EXPECT_NEAR(std::sqrt(dot(grazing.velocity, grazing.velocity)), speed, 1e-9);
