@@ -10,7 +10,7 @@ namespace breccia::bench {
 namespace {
 
 // Fields that gravity does not need are left out: so many more particles fit.
-Scene bare_scene(const GravityState& state) {
+Scene bare_scene(const GravityState& state, Precision precision) {
   Scene scene;
   scene.name = "bench";
   scene.materials.resize(1);
@@ -19,7 +19,7 @@ Scene bare_scene(const GravityState& state) {
   body.name = "all";
   body.particles = state.position.size();
   scene.bodies.push_back(body);
-  scene.numerics.precision = Precision::kMixed;
+  scene.numerics.precision = precision;
   EffectSwitches& e = scene.effects;
   e.gravity = GravityMethod::kTree;
   e.strength = e.damage = e.viscosity = e.energy = e.shear = Switch::kOff;
@@ -49,11 +49,12 @@ std::vector<T> column(const EngineState& state, const char* name, std::size_t co
 
 }  // namespace
 
-DeviceField::DeviceField(const GravityState& state, const mpi::Comm& comm) {
+DeviceField::DeviceField(const GravityState& state, Precision precision, const mpi::Comm& comm)
+    : precision_(precision) {
   if (comm.size() > 1) throw UsageError("gravity --device cuda measures one rank");
   const grid::EngineChoice choice = grid::choose_engine(grid::Device::kCuda, comm);
   device_ = choice.reason;
-  const Scene scene = bare_scene(state);
+  const Scene scene = bare_scene(state, precision);
   engine_ = sim::make_loaded_engine(scene, sim::resolve_effects(scene), particles_of(state), 1, comm, choice.make);
 }
 
@@ -64,12 +65,16 @@ std::unique_ptr<gravity::ResidentSolver> DeviceField::make_solver(GravityMethod 
 
 std::vector<Vec3d> DeviceField::held() const {
   const EngineState state = engine_->save();
-  const auto values = column<float>(state, "gravity", 3);
   const auto id = column<std::int32_t>(state, "id_low", 1);
   std::vector<Vec3d> a(state.particles);
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    a[static_cast<std::size_t>(id[i])] = {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
-  }
+  const auto read = [&](auto zero) {
+    const auto values = column<decltype(zero)>(state, "gravity", 3);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      const auto at = [&](std::size_t axis) { return static_cast<double>(values[3 * i + axis]); };
+      a[static_cast<std::size_t>(id[i])] = {at(0), at(1), at(2)};
+    }
+  };
+  precision_ == Precision::kDouble ? read(0.0) : read(0.0F);
   return a;
 }
 

@@ -14,8 +14,8 @@ namespace breccia::bench {
 
 class DeviceField {
  public:
-  /// One rank, mixed precision. Throws UsageError if there is no device.
-  DeviceField(const GravityState& state, const mpi::Comm& comm);
+  /// One rank. Throws UsageError if there is no device.
+  DeviceField(const GravityState& state, Precision precision, const mpi::Comm& comm);
 
   [[nodiscard]] const std::string& device() const { return device_; }
   [[nodiscard]] std::unique_ptr<gravity::ResidentSolver> make_solver(GravityMethod method,
@@ -24,6 +24,7 @@ class DeviceField {
   [[nodiscard]] std::vector<Vec3d> held() const;
 
  private:
+  Precision precision_;
   std::string device_;
   std::unique_ptr<grid::Engine> engine_;
 };

@@ -252,7 +252,7 @@ void measure_state(char name, std::int64_t n, const GravityBenchOptions& options
   std::optional<DeviceField> device;
   std::optional<DirectSlice> slice;
   if (options.device == "cuda") {
-    device.emplace(state, comm);
+    device.emplace(state, options.precision == "double" ? Precision::kDouble : Precision::kMixed, comm);
   } else {
     slice.emplace(state, options.threads);
   }
