@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -10,6 +11,11 @@
 #include "grid/particles.hpp"
 
 namespace breccia::cuda {
+
+/// The fields of grid::fields, but with the state of the flaws in two words: the threshold of the next in full, as
+/// every step reads it.
+template <class P>
+std::span<const grid::FieldDescriptor> device_fields();
 
 template <class P>
 class DeviceParticles {

@@ -124,6 +124,7 @@ class HostEngine final : public Engine {
   std::vector<Placement> restore_places(const EngineState& state);
   void restore_field(const FieldDescriptor& field, const EngineState& state);
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
+  void take_flaws(const material::FlawLists& flaws);  // into the arena
   // The flaws of list `row` become those of `slot`; the first `active` of them grow already.
   void set_flaws(std::size_t slot, const material::FlawLists& flaws, std::size_t row, std::uint32_t active);
 
@@ -156,6 +157,7 @@ class HostEngine final : public Engine {
   [[nodiscard]] Vec3d position(std::size_t slot, BlockCoord block) const;
   [[nodiscard]] std::uint64_t id(std::size_t slot) const;
   [[nodiscard]] std::uint32_t material(std::size_t slot) const;
+  [[nodiscard]] std::span<const material::FlawCode> flaws_of(std::size_t slot) const;
   [[nodiscard]] double hencky_norm(std::size_t slot) const;  // |dev h| of the elastic strain
 
   EngineSetup setup_;
@@ -168,7 +170,7 @@ class HostEngine final : public Engine {
   TransferParameters transfer_;
 
   ParticleStore<P> store_;
-  std::vector<float> flaw_thresholds_;
+  std::vector<material::FlawCode> flaw_codes_;
   std::vector<Tile> tiles_;
   std::vector<BlockKey> stacks_;               // lowest block of each tile
   std::size_t occupied_blocks_ = 0;            // of the tiles

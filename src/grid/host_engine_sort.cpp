@@ -103,9 +103,8 @@ void HostEngine<P>::migrate(std::vector<Placement>& placements) {
     store_.read_record(p.slot, record.data());
     put(message, record.data(), bytes);
     if (with_flaws) {
-      const Flaws<P>& f = store_.flaws[p.slot / kLanes];
-      const int lane = static_cast<int>(p.slot % kLanes);
-      put(message, flaw_thresholds_.data() + f.first[lane], static_cast<std::size_t>(f.count[lane] >> 16));
+      const std::span<const material::FlawCode> own = flaws_of(p.slot);
+      put(message, own.data(), own.size());
     }
     return true;
   });
@@ -123,10 +122,10 @@ void HostEngine<P>::migrate(std::vector<Placement>& placements) {
         from += bytes;
         if (with_flaws) {
           Flaws<P>& f = store_.flaws[p.slot / kLanes];
-          const auto count = static_cast<std::size_t>(f.count[static_cast<int>(lane)] >> 16);
-          f.first.set(static_cast<int>(lane), static_cast<std::int32_t>(flaw_thresholds_.size()));
-          flaw_thresholds_.resize(flaw_thresholds_.size() + count);
-          get(from, flaw_thresholds_.data() + flaw_thresholds_.size() - count, count);
+          const auto count = static_cast<std::size_t>(FlawState::of(f.state[static_cast<int>(lane)]).all);
+          f.first.set(static_cast<int>(lane), static_cast<std::int32_t>(flaw_codes_.size()));
+          flaw_codes_.resize(flaw_codes_.size() + count);
+          get(from, flaw_codes_.data() + flaw_codes_.size() - count, count);
         }
         placements.push_back(p);
       }
@@ -240,20 +239,16 @@ template <class P>
 void HostEngine<P>::compact_flaws() {
   if (comm_.size() == 1) return;  // none has gone
   std::size_t live = 0;
-  for_each_particle([&](std::size_t slot, BlockCoord) {
-    live += static_cast<std::size_t>(store_.flaws[slot / kLanes].count[static_cast<int>(slot % kLanes)] >> 16);
-  });
-  if (flaw_thresholds_.size() <= 2 * live) return;
-  std::vector<float> kept;
+  for_each_particle([&](std::size_t slot, BlockCoord) { live += flaws_of(slot).size(); });
+  if (flaw_codes_.size() <= 2 * live) return;
+  std::vector<material::FlawCode> kept;
   kept.reserve(live);
   for_each_particle([&](std::size_t slot, BlockCoord) {
-    Flaws<P>& f = store_.flaws[slot / kLanes];
-    const int lane = static_cast<int>(slot % kLanes);
-    const auto first = flaw_thresholds_.begin() + f.first[lane];
-    f.first.set(lane, static_cast<std::int32_t>(kept.size()));
-    kept.insert(kept.end(), first, first + (f.count[lane] >> 16));
+    const std::span<const material::FlawCode> own = flaws_of(slot);
+    store_.flaws[slot / kLanes].first.set(static_cast<int>(slot % kLanes), static_cast<std::int32_t>(kept.size()));
+    kept.insert(kept.end(), own.begin(), own.end());
   });
-  flaw_thresholds_ = std::move(kept);
+  flaw_codes_ = std::move(kept);
 }
 
 template <class P>
@@ -273,7 +268,7 @@ void HostEngine<P>::switch_damage_off() {
   setup_.effects.damage = false;
   setup_.effects.fully_damaged = true;
   store_.drop_damage();
-  flaw_thresholds_ = {};
+  flaw_codes_ = {};
 }
 
 template class HostEngine<MixedPrecision>;
