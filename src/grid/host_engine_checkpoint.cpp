@@ -95,7 +95,7 @@ void HostEngine<P>::restore(const EngineState& state, const material::FlawLists&
   } else {
     choose_slabs(placements);
   }
-  settle(std::move(placements));
+  settle(placements);
 }
 
 template <class P>

@@ -76,7 +76,7 @@ void HostEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
   }
   smallest_mass_ = comm_.min(lightest);
   choose_slabs(placements);
-  settle(std::move(placements));
+  settle(placements);
 }
 
 template <class P>

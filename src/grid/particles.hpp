@@ -145,8 +145,8 @@ class ParticleStore {
 
   /// Rearranges: new slot s holds what old slot source[s] held; kEmpty makes an empty lane. source.size() is a multiple
   /// of the lanes. One group at a time. In place where no particle comes from far, so that the memory needed beside the
-  /// particles is that of the packs between old and new places; else with a copy of the group.
-  void gather(std::span<const std::uint32_t> source, int threads);
+  /// particles is that of the packs between old and new places; else with a copy of the group. Returns these bytes.
+  std::size_t gather(std::span<const std::uint32_t> source, int threads);
   static constexpr std::uint32_t kEmpty = 0xffffffffU;
 
   /// All fields of one slot as consecutive bytes, and back.
