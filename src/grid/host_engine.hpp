@@ -95,7 +95,7 @@ class HostEngine final : public Engine {
     if (timeline_ != nullptr) timeline_->add(name, lane, begin, end);
   }
 
-  // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
+  // Sorting and migration (host_engine_sort.cpp, _migrate.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
   void settle(std::span<const Placement> placements);
   template <class F>
   void settle_each(F&& for_each_placement);  // visits them: memory for all of them is not needed
@@ -103,7 +103,7 @@ class HostEngine final : public Engine {
   [[nodiscard]] Placement place(std::size_t slot, BlockCoord stack) const;  // of a particle that has moved
   [[nodiscard]] std::vector<Placement> place_all() const;
   void require_in_grid() const;
-  void send_to(BlockCell cell, std::size_t slot);
+  void set_destination(BlockCell cell, std::size_t slot);
   void put_record(const Placement& p, std::vector<std::byte>& message);  // of a particle that leaves
   void take_records(const std::vector<std::vector<std::byte>>& messages, Occupancy& occupancy);
   [[nodiscard]] std::vector<char> find_lone(Occupancy& occupancy) const;  // for each block of it
@@ -113,7 +113,7 @@ class HostEngine final : public Engine {
   [[nodiscard]] bool has_drifted(std::size_t slot, std::int32_t sorted_node) const;
   [[nodiscard]] bool lone_strayed() const;  // more than a node since the last sorting
   template <class F>
-  void for_each_sent(F&& visit) const;
+  void for_each_destination(F&& visit) const;
   void arrange(Occupancy& occupancy);
   void lay_out_tiles(std::span<std::uint32_t> place, std::uint32_t alone);
   [[nodiscard]] std::vector<std::uint32_t> find_tiles(const Occupancy& occupancy, std::span<const char> lone);

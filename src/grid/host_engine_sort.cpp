@@ -1,12 +1,10 @@
 // Sorting: every particle to the rank that owns its node, to its tile, and inside the tile to the order of its cell.
 #include <algorithm>
-#include <cstring>
 #include <string>
 #include <utility>
 
 #include "breccia/error.hpp"
 #include "grid/host_engine.hpp"
-#include "mpi/message.hpp"
 #include "mpi/together.hpp"
 
 namespace breccia::grid {
@@ -27,9 +25,6 @@ struct CellInStack {
 };
 
 constexpr std::uint32_t kNoTile = kNoBlock;
-
-using mpi::get;
-using mpi::put;
 
 }  // namespace
 
@@ -91,7 +86,7 @@ void HostEngine<P>::settle_each(F&& for_each_placement) {
   for_each_placement([&](const Placement& p) {
     const int rank = comm_.size() == 1 ? 0 : owner(p);
     if (rank == comm_.rank()) {
-      send_to(occupancy.add(p.node), p.slot);
+      set_destination(occupancy.add(p.node), p.slot);
     } else {
       put_record(p, leaving[static_cast<std::size_t>(rank)]);
     }
@@ -104,50 +99,8 @@ void HostEngine<P>::settle_each(F&& for_each_placement) {
 }
 
 template <class P>
-void HostEngine<P>::send_to(BlockCell cell, std::size_t slot) {
+void HostEngine<P>::set_destination(BlockCell cell, std::size_t slot) {
   store_.kinematics[slot / kLanes].node.set(static_cast<int>(slot % kLanes), cell.packed());
-}
-
-template <class P>
-void HostEngine<P>::put_record(const Placement& p, std::vector<std::byte>& message) {
-  const std::size_t bytes = store_.record_bytes();
-  put(message, p.node, 3);
-  message.resize(message.size() + bytes);
-  store_.read_record(p.slot, message.data() + message.size() - bytes);
-  if (store_.has(Group::kFlaws)) {
-    const std::span<const material::FlawCode> own = flaws_of(p.slot);
-    put(message, own.data(), own.size());
-  }
-  // Its lane is empty now.
-  store_.kinematics[p.slot / kLanes].mass.set(static_cast<int>(p.slot % kLanes), Real(0));
-}
-
-template <class P>
-void HostEngine<P>::take_records(const std::vector<std::vector<std::byte>>& messages, Occupancy& occupancy) {
-  const std::size_t bytes = store_.record_bytes();
-  for (const std::vector<std::byte>& message : messages) {
-    const std::byte* from = message.data();
-    const std::byte* const end = from + message.size();
-    while (from != end) {
-      // A pack at a time: slots are cheap until arrange() closes the gaps.
-      const std::size_t first = store_.packs() * kLanes;
-      store_.append_packs(1);
-      for (std::size_t slot = first; slot < first + kLanes && from != end; ++slot) {
-        std::int32_t node[3];
-        get(from, node, 3);
-        store_.write_record(slot, from);
-        from += bytes;
-        send_to(occupancy.add(node), slot);
-        if (!store_.has(Group::kFlaws)) continue;
-        store_.flaws[slot / kLanes].first.set(static_cast<int>(slot % kLanes),
-                                              static_cast<std::int32_t>(flaw_codes_.size()));
-        const auto count = static_cast<std::size_t>(
-            FlawState::of(store_.flaws[slot / kLanes].state[static_cast<int>(slot % kLanes)]).all);
-        flaw_codes_.resize(flaw_codes_.size() + count);
-        get(from, flaw_codes_.data() + flaw_codes_.size() - count, count);
-      }
-    }
-  }
 }
 
 // The tile of each block of particles in the order of their stacks, kNoTile where its particle is alone.
@@ -176,7 +129,7 @@ std::vector<std::uint32_t> HostEngine<P>::find_tiles(const Occupancy& occupancy,
 // Calls visit(slot, cell) for the particles that have been sent to a cell, in the order of their slots.
 template <class P>
 template <class F>
-void HostEngine<P>::for_each_sent(F&& visit) const {
+void HostEngine<P>::for_each_destination(F&& visit) const {
   for (std::size_t p = 0; p < store_.packs(); ++p) {
     const Kinematics<P>& k = store_.kinematics[p];
     for (std::size_t l = 0; l < kLanes; ++l) {
@@ -200,7 +153,7 @@ void HostEngine<P>::arrange(Occupancy& occupancy) {
   std::vector<std::uint32_t> place(stacks_.size() * kStackCells, 0U);
   occupied_cells_.assign(stacks_.size(), OccupiedCells{});
   std::uint32_t alone = 0;
-  for_each_sent([&](std::size_t, const BlockCell& to) {
+  for_each_destination([&](std::size_t, const BlockCell& to) {
     const std::uint32_t t = tile_of_block[to.block];
     if (t == kNoTile) {
       ++alone;
@@ -218,7 +171,7 @@ void HostEngine<P>::arrange(Occupancy& occupancy) {
   std::vector<std::uint32_t> source((lone_.first_pack + packs_for(alone)) * kLanes, ParticleStore<P>::kEmpty);
   lone_stack_.clear();
   lone_node_.clear();
-  for_each_sent([&](std::size_t from, const BlockCell& to) {
+  for_each_destination([&](std::size_t from, const BlockCell& to) {
     const CellInStack cell = in_stack(to);
     const std::uint32_t t = tile_of_block[to.block];
     std::size_t slot = lone_.first_pack * kLanes + lone_stack_.size();
@@ -274,22 +227,6 @@ void HostEngine<P>::sort_cells_by_id(std::span<std::uint32_t> source, std::span<
       first = last;
     }
   }
-}
-
-template <class P>
-void HostEngine<P>::compact_flaws() {
-  if (comm_.size() == 1) return;  // none has gone
-  std::size_t live = 0;
-  for_each_particle([&](std::size_t slot, BlockCoord) { live += flaws_of(slot).size(); });
-  if (flaw_codes_.size() <= 2 * live) return;
-  std::vector<material::FlawCode> kept;
-  kept.reserve(live);
-  for_each_particle([&](std::size_t slot, BlockCoord) {
-    const std::span<const material::FlawCode> own = flaws_of(slot);
-    store_.flaws[slot / kLanes].first.set(static_cast<int>(slot % kLanes), static_cast<std::int32_t>(kept.size()));
-    kept.insert(kept.end(), own.begin(), own.end());
-  });
-  flaw_codes_ = std::move(kept);
 }
 
 template <class P>
