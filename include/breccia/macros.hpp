@@ -12,3 +12,11 @@
 // For lambdas inside inlined kernel code: g++ would otherwise emit them as weak symbols, one of which the linker keeps
 // for every instruction set.
 #define BRECCIA_INLINE_LAMBDA __attribute__((always_inline))
+
+// Before a loop: how often its body is to be repeated.
+#define BRECCIA_PRAGMA(text) _Pragma(#text)
+#if defined(__CUDACC__)
+#define BRECCIA_UNROLL(times) BRECCIA_PRAGMA(unroll times)
+#else
+#define BRECCIA_UNROLL(times) BRECCIA_PRAGMA(GCC unroll times)
+#endif

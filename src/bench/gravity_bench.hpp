@@ -14,8 +14,9 @@ struct GravityBenchOptions {
   std::vector<double> openings;         ///< of the tree; empty: fast, default and tight
   bool body = false;                    ///< the net force on the first body at more than 100,000 particles too
   int threads = 1;
-  int pairs = 5;     ///< evaluations, each followed by a slice of the direct sum
-  std::string json;  ///< file for the results, "-" for standard output, empty for none
+  int pairs = 5;                ///< evaluations, each followed by a slice of the direct sum
+  std::string device = "host";  ///< "cuda": the device's own solvers, in wall time, against its own direct sum
+  std::string json;             ///< file for the results, "-" for standard output, empty for none
 };
 
 /// Measures seconds of user CPU time, ratio to the float direct sum of the same run and errors against direct sums in

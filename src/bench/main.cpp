@@ -33,6 +33,7 @@ int measure(int argc, char** argv) {
   gravity->add_option("--opening", gravity_options.openings, "tolerances of the tree");
   gravity->add_flag("--body", gravity_options.body, "net force on the first body at a million particles too: a minute");
   gravity->add_option("--threads", gravity_options.threads, "threads");
+  gravity->add_option("--device", gravity_options.device, "host or cuda")->check(CLI::IsMember({"host", "cuda"}));
   gravity->add_option("--pairs", gravity_options.pairs, "evaluations per setting; the best counts");
   gravity->add_option("--json", gravity_options.json, "file for the results, - for standard output");
   breccia::bench::WorkBenchOptions work_options;

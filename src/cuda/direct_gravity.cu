@@ -15,15 +15,46 @@ __device__ __forceinline__ Vec3d position_of(const BodyArrays& bodies, unsigned 
   return {bodies.position[0][i], bodies.position[1][i], bodies.position[2][i]};
 }
 
+// A tile is wide beyond so many softening lengths: there the rounding of floats would show in the distances of
+// neighbours.
+constexpr double kNarrow = 1024.0;
+
+template <class Real>
+struct DirectTile {
+  PairTile<Real> pairs;
+  Vec3<Real> rest[kTileSources];  ///< what rounding left of the sources' positions
+};
+
+/// What rounding leaves of a position.
+template <class Real>
+__device__ __forceinline__ Vec3<Real> rest_of(Vec3d x) {
+  return to_real<Real>(x - to_double(to_real<Real>(x)));
+}
+
+/// sum_of_tile() on exact differences of coordinates. Rare: sources among debris.
+template <class Real>
+__device__ __forceinline__ Vec3d sum_of_wide_tile(const DirectTile<Real>& tile, unsigned count, Vec3d target,
+                                                  Real softening_squared) {
+  const Vec3<Real> position = to_real<Real>(target);
+  const Vec3<Real> rest = rest_of<Real>(target);
+  Vec3<Real> sum{};
+  for (unsigned j = 0; j < count; ++j) {
+    const PointMass<Real> s = tile.pairs.source[j];
+    const Vec3<Real> d = (s.position - position) + (tile.rest[j] - rest);
+    sum += (s.mass * gravity::newton_pair(inverse_root(dot(d, d) + softening_squared)).force) * d;
+  }
+  return to_double(sum);
+}
+
 // sums[slice][3][targets] of the sources [slice * tiles, (slice + 1) * tiles) tiles.
 template <class Real>
 __global__ void __launch_bounds__(kTileSources) direct_sum(DirectArguments a, unsigned tiles, double* sums) {
-  BRECCIA_SHARED(PairTile<Real>, tile);
+  BRECCIA_SHARED(DirectTile<Real>, tile);
   const BodyArrays& sources = a.sources;
   const unsigned i = blockIdx.x * kTileSources + threadIdx.x;
-  PointMass<Real> target;
-  target.set(position_of(sources, a.first + (i < a.targets ? i : 0)), 0.0);
-  const auto softening = static_cast<Real>(a.softening * a.softening);
+  const Vec3d target = position_of(sources, a.first + (i < a.targets ? i : 0));
+  const auto softening = squared_softening<Real>(a.softening);
+  const double narrow = kNarrow * kNarrow * a.softening * a.softening;
   const double per_unit = 1.0 / a.mass_unit;
   Vec3d sum{};
   const unsigned begin = blockIdx.y * tiles * kTileSources;
@@ -31,12 +62,20 @@ __global__ void __launch_bounds__(kTileSources) direct_sum(DirectArguments a, un
     const unsigned from = begin + t * kTileSources;
     if (from >= sources.count) break;
     const unsigned count = sources.count - from < kTileSources ? sources.count - from : kTileSources;
+    // Particles come in the order of space, so most tiles are small.
+    const Vec3d origin = position_of(sources, from + count / 2);
+    bool far = false;
     if (threadIdx.x < count) {
       const unsigned j = from + threadIdx.x;
-      tile.source[threadIdx.x].set(position_of(sources, j), per_unit * sources.mass[j]);
+      const Vec3d x = position_of(sources, j) - origin;
+      const Vec3<Real> position = to_real<Real>(x);
+      far = sizeof(Real) == 4 && dot(x, x) > narrow;
+      tile.pairs.source[threadIdx.x] = {position, static_cast<Real>(per_unit * sources.mass[j])};
+      tile.rest[threadIdx.x] = rest_of<Real>(x);
     }
-    __syncthreads();
-    sum += sum_of_tile(tile, count, target, softening);
+    const bool wide = __syncthreads_count(far ? 1 : 0) > 0;
+    sum += wide ? sum_of_wide_tile(tile, count, target - origin, softening)
+                : sum_of_tile(tile.pairs, count, to_real<Real>(target - origin), softening);
     __syncthreads();
   }
   if (i >= a.targets) return;
@@ -68,7 +107,7 @@ void launch_direct_sum(const DirectArguments& a, double* acceleration, DeviceArr
   const unsigned slices = blocks_for(all_tiles, tiles);
   const unsigned values = 3 * a.targets;
   scratch.reserve(std::size_t{slices} * values);
-  BRECCIA_LAUNCH(direct_sum<Real>, dim3(blocks, slices), dim3(kTileSources), sizeof(PairTile<Real>), stream, a, tiles,
+  BRECCIA_LAUNCH(direct_sum<Real>, dim3(blocks, slices), dim3(kTileSources), sizeof(DirectTile<Real>), stream, a, tiles,
                  scratch.data());
   BRECCIA_LAUNCH(add_slices, dim3(blocks_for(values, kTileSources)), dim3(kTileSources), 0, stream, scratch.data(),
                  values, slices, kGravitationalConstant * a.mass_unit, acceleration);

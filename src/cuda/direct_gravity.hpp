@@ -15,8 +15,8 @@ struct DirectArguments {
   double softening = 0;  ///< [m]
 };
 
-/// acceleration[3][targets] [m/s2] by Newton's law softened after Plummer, with Real arithmetic on exact differences of
-/// coordinates. `scratch` is working memory.
+/// acceleration[3][targets] [m/s2] by Newton's law softened after Plummer, with Real arithmetic on
+/// coordinates from places near the sources, exact where these are far apart. `scratch` is working memory.
 template <class Real>
 void launch_direct_sum(const DirectArguments& a, double* acceleration, DeviceArray<double>& scratch,
                        cudaStream_t stream);

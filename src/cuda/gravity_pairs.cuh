@@ -3,6 +3,7 @@
 #pragma once
 
 #include "breccia/linalg.hpp"
+#include "breccia/math.hpp"
 #include "cuda/device_runtime.hpp"
 #include "gravity/pair_law.hpp"
 
@@ -14,35 +15,21 @@ inline constexpr unsigned kTileSources = 128;
 __device__ __forceinline__ float inverse_root(float x) { return rsqrtf(x); }
 __device__ __forceinline__ double inverse_root(double x) { return rsqrt(x); }
 
-/// A coordinate as a sum of two floats, or one double: see gravity/points.hpp.
 template <class Real>
-struct Coordinate;
-template <>
-struct Coordinate<float> {
-  float high, low;
-  __device__ __forceinline__ void set(double x) {
-    high = static_cast<float>(x);
-    low = static_cast<float>(x - static_cast<double>(high));
-  }
-  __device__ __forceinline__ float minus(const Coordinate& b) const { return (high - b.high) + (low - b.low); }
-};
-template <>
-struct Coordinate<double> {
-  double value;
-  __device__ __forceinline__ void set(double x) { value = x; }
-  __device__ __forceinline__ double minus(const Coordinate& b) const { return value - b.value; }
-};
+__device__ __forceinline__ Vec3<Real> to_real(Vec3d x) {
+  return {static_cast<Real>(x.x), static_cast<Real>(x.y), static_cast<Real>(x.z)};
+}
+template <class Real>
+__device__ __forceinline__ Vec3d to_double(Vec3<Real> x) {
+  return {static_cast<double>(x.x), static_cast<double>(x.y), static_cast<double>(x.z)};
+}
 
+/// A source as seen from an origin near the sources of its tile: what is left of a coordinate in Real is exact to the
+/// rounding of distances in the tile, and of the distance to a target elsewhere. One load.
 template <class Real>
-struct alignas(16) PointMass {  // two loads of 16 bytes
-  Coordinate<Real> position[3];
+struct alignas(4 * sizeof(Real)) PointMass {
+  Vec3<Real> position;
   Real mass;
-  __device__ __forceinline__ void set(Vec3d x, double m) {
-    position[0].set(x.x);
-    position[1].set(x.y);
-    position[2].set(x.z);
-    mass = static_cast<Real>(m);
-  }
 };
 
 template <class Real>
@@ -50,20 +37,25 @@ struct PairTile {
   PointMass<Real> source[kTileSources];
 };
 
-/// Sum of m d q^3 over the first `count` sources. A target among them adds nothing: d = 0, and q stays finite.
+/// The square of a softening length [m2], enough of it that q^3 of a particle and itself stays finite.
 template <class Real>
-__device__ __forceinline__ Vec3d sum_of_tile(const PairTile<Real>& tile, unsigned count, const PointMass<Real>& target,
+BRECCIA_HD Real squared_softening(double softening) {
+  return max(static_cast<Real>(softening * softening), gravity::kCoincidentPair<Real>);
+}
+
+/// Sum of m d q^3 over the first `count` sources for a target seen from the same origin. A target among them adds
+/// nothing, as d = 0.
+template <class Real>
+__device__ __forceinline__ Vec3d sum_of_tile(const PairTile<Real>& tile, unsigned count, Vec3<Real> target,
                                              Real softening_squared) {
   Vec3<Real> sum{};
+  BRECCIA_UNROLL(8)
   for (unsigned j = 0; j < count; ++j) {
-    const PointMass<Real>& s = tile.source[j];
-    const Vec3<Real> d{s.position[0].minus(target.position[0]), s.position[1].minus(target.position[1]),
-                       s.position[2].minus(target.position[2])};
-    const Real r2 = dot(d, d) + softening_squared;
-    const Real q = r2 <= gravity::kCoincidentPair<Real> ? Real(0) : inverse_root(r2);
-    sum += (s.mass * gravity::newton_pair(q).force) * d;
+    const PointMass<Real> s = tile.source[j];
+    const Vec3<Real> d = s.position - target;
+    sum += (s.mass * gravity::newton_pair(inverse_root(dot(d, d) + softening_squared)).force) * d;
   }
-  return {static_cast<double>(sum.x), static_cast<double>(sum.y), static_cast<double>(sum.z)};
+  return to_double(sum);
 }
 
 }  // namespace breccia::cuda

@@ -36,7 +36,7 @@ __global__ void __launch_bounds__(kThreads) expand_cells(WalkStep w) {
   const unsigned end = list.first[w.pair_first[t + 1]];
   if (begin == end) return;
   const Vec3d centre = w.tree.cells[w.target[t].cell].centre;
-  const auto softening_squared = static_cast<Real>(w.softening * w.softening);
+  const auto softening_squared = squared_softening<Real>(w.softening);
   gravity::LocalExpansion<Real> sum{};
   for (unsigned k = begin + threadIdx.x % kWarp; k < end; k += kWarp) {
     DistantCell<Real> source;
@@ -101,8 +101,7 @@ __device__ __forceinline__ unsigned leaf_particle(const WalkStep& w, const Group
 // The same for particles: first the group's own where they are sources, then those of the leaves.
 template <class Real>
 __device__ __forceinline__ Vec3d field_of_particles(const WalkStep& w, const GroupSums& s, const Group& g,
-                                                    PairTile<Real>& tile, const PointMass<Real>& target,
-                                                    Real softening_squared) {
+                                                    PairTile<Real>& tile, Vec3<Real> target, Real softening_squared) {
   const unsigned own = g.own_sources;
   const unsigned all = own + (g.end_source - g.first_source);
   Vec3d total{};
@@ -111,7 +110,8 @@ __device__ __forceinline__ Vec3d field_of_particles(const WalkStep& w, const Gro
     if (threadIdx.x < count) {
       const unsigned k = from + threadIdx.x;
       const unsigned j = k < own ? g.begin + k : leaf_particle(w, s, g, g.first_source + (k - own));
-      tile.source[threadIdx.x].set(position_of(s.sources, j) - g.centre, s.sources.mass[j]);
+      tile.source[threadIdx.x] = {to_real<Real>(position_of(s.sources, j) - g.centre),
+                                  static_cast<Real>(s.sources.mass[j])};
     }
     __syncthreads();
     total += sum_of_tile(tile, count, target, softening_squared);
@@ -158,17 +158,14 @@ __global__ void __launch_bounds__(kThreads) sum_groups(WalkStep w, GroupSums s) 
   const unsigned t = blockIdx.x;
   if (w.target[t].divides) return;
   const Group g = group_of(w, s, t);
-  const auto softening_squared = static_cast<Real>(w.softening * w.softening);
+  const auto softening_squared = squared_softening<Real>(w.softening);
   // More than a block's threads only where many particles lie on one point.
   for (unsigned first = g.begin; first < g.end; first += kThreads) {
     const unsigned i = first + threadIdx.x < g.end ? first + threadIdx.x : g.begin;
-    const Vec3d r = position_of(s.bodies, i) - g.centre;
-    const Vec3<Real> x = to_real<Real>(r);
+    const Vec3<Real> x = to_real<Real>(position_of(s.bodies, i) - g.centre);
     Vec3d sum = far_field(w.far[t], x);
     sum += field_of_cells(w, g, shared.cells, x, softening_squared);
-    PointMass<Real> target;
-    target.set(r, 0.0);
-    sum += field_of_particles(w, s, g, shared.pairs, target, softening_squared);
+    sum += field_of_particles(w, s, g, shared.pairs, x, softening_squared);
     const unsigned to = s.bodies.order[i] - s.first;
     if (first + threadIdx.x >= g.end || to >= s.own) continue;
     s.acceleration[to] += s.unit * sum.x;

@@ -6,15 +6,6 @@
 
 namespace breccia::cuda {
 
-template <class Real>
-__device__ __forceinline__ Vec3<Real> to_real(Vec3d x) {
-  return {static_cast<Real>(x.x), static_cast<Real>(x.y), static_cast<Real>(x.z)};
-}
-template <class Real>
-__device__ __forceinline__ Vec3d to_double(Vec3<Real> x) {
-  return {static_cast<double>(x.x), static_cast<double>(x.y), static_cast<double>(x.z)};
-}
-
 /// A cell as seen from an origin.
 template <class Real>
 struct DistantCell {

@@ -152,8 +152,8 @@ inline constexpr double kMixedShear = 1e-3;
 // Likewise the velocity gradient itself: of velocities of 150 m/s, differences of some m/s from cell to cell.
 inline constexpr double kMixedGradient = 1e-4;
 
-inline void expect_below(const Difference& d, Precision precision) {
-  const double tolerance = precision == Precision::kDouble ? kDouble : kMixed;
+inline void expect_below(const Difference& d, Precision precision, double mixed = kMixed) {
+  const double tolerance = precision == Precision::kDouble ? kDouble : mixed;
   EXPECT_LE(d.position, tolerance);
   EXPECT_LE(d.velocity, tolerance);
   EXPECT_LE(d.energy, tolerance);
