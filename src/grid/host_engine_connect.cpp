@@ -163,7 +163,8 @@ void HostEngine<P>::make_room() {
   }
   sums_.resize(blocks * kBlockReals, Real(0));
   // Read are velocities of nodes that a scatter has reached since, and with weight 0 those beside them.
-  velocities_.assign(blocks_.size() * kBlockReals, Real(0));
+  velocities_.reserve(blocks_.size() * kBlockReals);  // else it might grow to twice that
+  velocities_.resize(blocks_.size() * kBlockReals, Real(0));
   rows_.assign(blocks, RowMask{});
 }
 

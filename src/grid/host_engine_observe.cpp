@@ -183,8 +183,7 @@ EngineStats HostEngine<P>::stats() const {
   stats.particle_bytes +=
       flaw_codes_.capacity() * sizeof(material::FlawCode) + lone_pull_.capacity() * sizeof(LonePull<P>);
   stats.grid_bytes = (sums_.capacity() + velocities_.capacity()) * sizeof(Real);
-  const std::size_t given_back = velocities_.capacity() * sizeof(Real);
-  stats.sort_bytes = sort_bytes_ > given_back ? sort_bytes_ - given_back : 0;
+  stats.sort_bytes = sort_bytes_;
   return stats;
 }
 

@@ -80,7 +80,11 @@ void HostEngine<P>::settle(std::span<const Placement> placements) {
 template <class P>
 template <class F>
 void HostEngine<P>::settle_each(F&& for_each_placement) {
-  velocities_ = {};  // room for the places of particles: they follow from the next scatter
+  // Velocities follow from the next scatter. Where nodes are few beside particles, it costs little to clear them anew,
+  // and their memory is room for the places of particles.
+  const std::size_t of_nodes = velocities_.capacity() * sizeof(Real);
+  const bool given_back = 8 * of_nodes < store_.packs() * kLanes * store_.record_bytes();
+  if (given_back) velocities_ = {};
   Occupancy occupancy;
   std::vector<std::vector<std::byte>> leaving(static_cast<std::size_t>(comm_.size()));
   for_each_placement([&](const Placement& p) {
@@ -93,6 +97,7 @@ void HostEngine<P>::settle_each(F&& for_each_placement) {
   });
   if (comm_.size() > 1) take_records(comm_.alltoall(leaving), occupancy);
   arrange(occupancy);
+  if (given_back) sort_bytes_ -= std::min(sort_bytes_, of_nodes);
   connect_tiles();
   report_ = {};
   gathers_ = 0;
