@@ -69,6 +69,25 @@ const char* name_of(GravityMethod method) {
   return "auto";
 }
 
+bool mesh_is_accurate(const Matter& matter, double error) {
+  return error >= kSmallestMeshError &&
+         std::all_of(matter.bodies.begin(), matter.bodies.end(),
+                     [](const DenseBody& body) { return body.particles >= kLeastAccurateBody; });
+}
+
+bool tree_disturbs_more(const Matter& matter, const Parameters& parameters) {
+  const double opening = opening_for(parameters, static_cast<double>(matter.particles));
+  const double by_tree = body_error_of_tree(matter.bodies, opening);
+  return by_tree > kBodyTolerance * parameters.error && body_error_of_mesh(matter.bodies, opening) < by_tree;
+}
+
+bool tree_might_disturb(std::uint64_t particles, const Parameters& parameters) {
+  if (particles < kLeastAccurateBody) return false;
+  const std::vector<DenseBody> smallest{{.particles = kLeastAccurateBody}};
+  return body_error_of_tree(smallest, opening_for(parameters, static_cast<double>(particles))) >
+         kBodyTolerance * parameters.error;
+}
+
 bool prefers_direct_sum(std::uint64_t particles, double error) {
   return particles <= kDirectParticles || error < kSmallestTreeError;
 }
@@ -87,15 +106,12 @@ MethodChoice cheapest_method(const Matter& matter, const Parameters& parameters)
     return {GravityMethod::kTree,
             fmt::format("tree, as gravity.error is below {:.0e}, the mesh's best", kSmallestMeshError)};
   }
-  const bool accurate = std::all_of(matter.bodies.begin(), matter.bodies.end(),
-                                    [](const DenseBody& body) { return body.particles >= kLeastAccurateBody; });
   MethodChoice choice = cheaper(matter);
-  if (choice.method == GravityMethod::kTreePm || !accurate) return choice;
-  // A mesh disturbs bodies less than the tree wherever it is laid.
+  if (choice.method == GravityMethod::kTreePm || !mesh_is_accurate(matter, error)) return choice;
+  if (!tree_disturbs_more(matter, parameters)) return choice;
   const double opening = opening_for(parameters, static_cast<double>(matter.particles));
   const double by_tree = body_error_of_tree(matter.bodies, opening);
   const double by_mesh = body_error_of_mesh(matter.bodies, opening);
-  if (by_tree <= kBodyTolerance * error || by_mesh >= by_tree) return choice;
   return {
       GravityMethod::kTreePm,
       fmt::format("particle mesh, though dearer: the tree's net force on a dense body would be off by {:.1e} of the "

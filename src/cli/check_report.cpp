@@ -13,11 +13,7 @@ namespace breccia::cli {
 
 double CheckReport::steps() const { return std::ceil(loaded.scene.time.end / plan.time_step); }
 
-double CheckReport::memory_per_rank() const {
-  return plan.bytes_per_particle * static_cast<double>(plan.particles) / ranks;
-}
-
-double CheckReport::wall_seconds() const { return seconds_per_step * steps() / ranks; }
+double CheckReport::wall_seconds() const { return calibration.seconds_per_step * steps() / ranks; }
 
 namespace {
 
@@ -63,10 +59,14 @@ void append_plan(Text& text, const CheckReport& report) {
                  scene::format_quantity(report.loaded.scene.time.end, scene::kTime));
   fmt::format_to(std::back_inserter(text), "  particles        {}\n", plan.particles);
   fmt::format_to(
-      std::back_inserter(text), "  memory per rank  {} on {} rank{}: {:.0f} bytes per particle, and the grid\n",
-      human_bytes(report.memory_per_rank()), report.ranks, report.ranks == 1 ? "" : "s", plan.bytes_per_particle);
+      std::back_inserter(text), "  memory per rank  {} on {} rank{}, of it {:.0f} bytes of fields per particle\n",
+      human_bytes(report.calibration.host_bytes), report.ranks, report.ranks == 1 ? "" : "s", plan.bytes_per_particle);
+  if (report.calibration.device_bytes > 0.0) {
+    fmt::format_to(std::back_inserter(text), "  on CUDA devices  {} of a device for each rank\n",
+                   human_bytes(report.calibration.device_bytes));
+  }
   fmt::format_to(std::back_inserter(text), "  wall time        about {}: {} per step on one core of this machine\n",
-                 human_duration(report.wall_seconds()), human_duration(report.seconds_per_step));
+                 human_duration(report.wall_seconds()), human_duration(report.calibration.seconds_per_step));
 }
 
 }  // namespace
@@ -107,8 +107,9 @@ Json as_json(const CheckReport& report) {
   json["particles"] = report.plan.particles;
   json["bytes_per_particle"] = report.plan.bytes_per_particle;
   json["ranks"] = report.ranks;
-  json["memory_per_rank"] = report.memory_per_rank();
-  json["seconds_per_step"] = report.seconds_per_step;
+  json["memory_per_rank"] = report.calibration.host_bytes;
+  if (report.calibration.device_bytes > 0.0) json["device_memory_per_rank"] = report.calibration.device_bytes;
+  json["seconds_per_step"] = report.calibration.seconds_per_step;
   json["wall_seconds"] = report.wall_seconds();
   return json;
 }

@@ -19,10 +19,10 @@ struct Options {
 };
 
 CheckReport make_report(const SceneOptions& options, const mpi::Comm& comm) {
-  CheckReport report{.loaded = load(options, comm), .plan = {}, .ranks = comm.size()};
+  CheckReport report{.loaded = load(options, comm), .plan = {}, .ranks = comm.size(), .calibration = {}};
   report.plan = sim::make_plan(report.loaded.scene);
   // The calibration is a short run on one core; the other ranks keep still meanwhile.
-  io::on_root(comm, [&] { report.seconds_per_step = sim::calibrate(report.loaded.scene); });
+  io::on_root(comm, [&] { report.calibration = sim::calibrate(report.loaded.scene, comm.size()); });
   return report;
 }
 

@@ -201,8 +201,10 @@ PredictArguments<typename P::Real> CudaEngine<P>::predict_arguments(double time)
 template <class P>
 std::unique_ptr<gravity::ResidentSolver> CudaEngine<P>::make_resident_solver(GravityMethod method,
                                                                              const gravity::Parameters& parameters) {
-  return std::make_unique<CudaGravity<Real>>(
+  auto solver = std::make_unique<CudaGravity<Real>>(
       method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_);
+  solver->require_memory();
+  return solver;
 }
 
 template <class P>

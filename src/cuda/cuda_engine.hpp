@@ -65,7 +65,6 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   [[nodiscard]] PredictArguments<Real> predict_arguments(double time) const;
   void launch_pass(PassArguments<Real> arguments);
   void settle();
-  void require_memory(const Load& load) const;
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
   // What a probe of the grid says of each particle, component after component; empty vectors without a grid.
   struct GridView {

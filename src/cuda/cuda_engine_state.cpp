@@ -4,6 +4,7 @@
 
 #include "breccia/error.hpp"
 #include "cuda/cuda_engine.hpp"
+#include "cuda/device_load.hpp"
 #include "grid/state_columns.hpp"
 
 namespace breccia::cuda {
@@ -24,17 +25,7 @@ void CudaEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
   // The host engine knows how positions become nodes and offsets; once, at the start.
   const auto host = grid::make_host_engine(setup_, comm_);
   host->insert(particles, flaws, spin_of_body);
-  const grid::EngineStats held = host->stats();
-  require_memory({.particles = held.particles,
-                  .tiles = held.occupied_blocks,
-                  .blocks = held.blocks,
-                  .flaws = host->flaws().threshold.size()});
   restore(host->save(), host->flaws());
-}
-
-template <class P>
-void CudaEngine<P>::require_memory(const Load& load) const {
-  cuda::require_memory(bytes_needed<P>(particles_.record_bytes(), load), comm_);
 }
 
 template <class P>
@@ -106,6 +97,9 @@ void CudaEngine<P>::restore(const EngineState& state, const material::FlawLists&
   }
   slabs_ = saved;
   if (state.damage_finished && setup_.effects.damage) switch_damage_off();
+  const Load load =
+      count_load(state, flaws.threshold.size(), boundaries_.periodicity(), grid_.lone_without_grid(), own_planes());
+  require_memory(bytes_needed<P>(particles_.record_bytes(), load), "the particles and their grid", comm_);
   particles_.allocate(state.particles);
   std::vector<grid::BlockKey> keys(state.particles);
   std::vector<std::int32_t> packed(state.particles);

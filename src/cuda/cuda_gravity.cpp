@@ -6,7 +6,10 @@
 #include <utility>
 
 #include "breccia/constants.hpp"
+#include "cuda/device_memory.hpp"
 #include "cuda/direct_gravity.hpp"
+#include "cuda/gravity_choice.hpp"
+#include "cuda/gravity_memory.hpp"
 #include "gravity/evaluation.hpp"
 #include "gravity/mesh/layout.hpp"
 #include "gravity/mesh/settings.hpp"
@@ -22,7 +25,9 @@ template <class Real>
 CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles,
                                const mpi::Comm& comm, cudaStream_t stream)
     : method_(method),
-      parameters_(method == GravityMethod::kTreePm ? gravity::with_checked_mesh(parameters) : parameters),
+      parameters_(method == GravityMethod::kTreePm || method == GravityMethod::kAuto
+                      ? gravity::with_checked_mesh(parameters)
+                      : parameters),
       particles_(std::move(particles)),
       comm_(comm),
       stream_(stream),
@@ -30,17 +35,48 @@ CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& 
       sets_(stream),
       unsplit_(comm, stream) {}
 
+// By the host, by its rule.
 template <class Real>
-void CudaGravity<Real>::choose_method(unsigned particles) {
-  stats_.method = method_;
-  if (method_ != GravityMethod::kAuto) return;
-  if (particles <= kMostDirect || parameters_.error < gravity::kSmallestTreeError) {
-    stats_.method = GravityMethod::kDirect;
-    stats_.reason = "direct sum on the device for up to " + std::to_string(kMostDirect) + " particles";
-  } else {
-    stats_.method = GravityMethod::kTree;
-    stats_.reason = "tree on the device for more than " + std::to_string(kMostDirect) + " particles";
+gravity::Layout CudaGravity<Real>::lay_boxes() {
+  gravity::Layout layout;
+  stats_.phases.time(Phase::kBoxes, [&] {
+    const HostBodies own = bodies_.own_on_host();
+    layout = gravity::lay_boxes({own.position, own.mass}, parameters_.mesh, comm_, 1);
+  });
+  return layout;
+}
+
+template <class Real>
+bool CudaGravity<Real>::needs_boxes(std::uint64_t particles) const {
+  if (method_ != GravityMethod::kAuto) return method_ == GravityMethod::kTreePm;
+  return choice_needs_boxes(particles, parameters_, kDeviceRates<Real>, comm_.size());
+}
+
+template <class Real>
+gravity::MethodChoice CudaGravity<Real>::choose_method(std::uint64_t particles, gravity::Layout& layout) {
+  const bool with_boxes = needs_boxes(particles);
+  if (with_boxes) layout = lay_boxes();
+  if (method_ != GravityMethod::kAuto) return {method_, ""};
+  const gravity::Matter matter = with_boxes ? gravity::matter_of(layout) : gravity::Matter{.particles = particles};
+  return cheapest_on_device(matter, parameters_, kDeviceRates<Real>, comm_.size());
+}
+
+template <class Real>
+void CudaGravity<Real>::require_memory() {
+  const PredictArguments<Real> own = particles_(0.0);
+  const std::uint64_t all = comm_.sum(std::uint64_t{own.count});
+  if (needs_boxes(all)) bodies_.gather(own);
+  gravity::Layout layout;
+  const GravityMethod method = choose_method(all, layout).method;
+  GravityLoad load{.own = own.count,
+                   .all = all,
+                   .ranks = comm_.size(),
+                   .opening = gravity::opening_for(parameters_, static_cast<double>(all))};
+  for (std::size_t k = 0; k < layout.boxes.size(); ++k) {
+    load.boxes.push_back({layout.count[k + 1], gravity::MeshGeometry(layout.boxes[k], layout.cell).size});
   }
+  bodies_.forget();  // they are counted
+  cuda::require_memory(bytes_for_gravity<Real>(method, load), "gravity beside the particles", comm_);
 }
 
 template <class Real>
@@ -54,7 +90,11 @@ void CudaGravity<Real>::evaluate_and_hold(double time) {
   const double mass_unit = extremes.of[6] > 0.0 ? extremes.of[6] : 1.0;
 
   acceleration_.reserve(3 * std::size_t{own.count});
-  choose_method(bodies_.all().count);
+  gravity::Layout layout;
+  const gravity::MethodChoice choice = choose_method(bodies_.all().count, layout);
+  if (layout.spacing > 0.0) parameters_.mesh.particle_spacing = layout.spacing;
+  stats_.method = choice.method;
+  stats_.reason = choice.reason;
   if (stats_.method == GravityMethod::kDirect) {
     stats_.phases.time(Phase::kPairs, [&] { sum_directly(mass_unit); });
   } else {
@@ -63,7 +103,7 @@ void CudaGravity<Real>::evaluate_and_hold(double time) {
     if (stats_.method == GravityMethod::kTree) {
       sum_unsplit({&all, 1}, extremes, mass_unit);
     } else {
-      sum_by_mesh(extremes, mass_unit);
+      sum_by_mesh(layout, extremes, mass_unit);
     }
   }
   const Vec3d net = net_force(own);
@@ -92,16 +132,9 @@ void CudaGravity<Real>::sum_unsplit(std::span<const BodyArrays> sets, const Extr
                      acceleration_.data(), stats_);
 }
 
-// Boxes are chosen on the host, by its rule.
 template <class Real>
-void CudaGravity<Real>::sum_by_mesh(const Extremes& extremes, double mass_unit) {
-  gravity::Layout layout;
-  stats_.phases.time(Phase::kBoxes, [&] {
-    const HostBodies own = bodies_.own_on_host();
-    layout = gravity::lay_boxes({own.position, own.mass}, parameters_.mesh, comm_, 1);
-    parameters_.mesh.particle_spacing = layout.spacing;
-    sets_.divide(bodies_.all(), layout.boxes);
-  });
+void CudaGravity<Real>::sum_by_mesh(const gravity::Layout& layout, const Extremes& extremes, double mass_unit) {
+  stats_.phases.time(Phase::kBoxes, [&] { sets_.divide(bodies_.all(), layout.boxes); });
   const std::span<const BodyArrays> sets = sets_.sets();
   stats_.boxes = static_cast<int>(layout.boxes.size());
   while (boxes_.size() < layout.boxes.size()) boxes_.push_back(std::make_unique<BoxGravity<Real>>(comm_, stream_));

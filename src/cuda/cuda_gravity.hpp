@@ -8,13 +8,10 @@
 #include "cuda/box_gravity.hpp"
 #include "cuda/gravity_bodies.hpp"
 #include "cuda/unsplit_gravity.hpp"
+#include "gravity/mesh/layout.hpp"
 #include "gravity/resident.hpp"
 
 namespace breccia::cuda {
-
-/// kAuto sums directly up to so many particles of all ranks, and takes the tree beyond. An estimate from the rates of
-/// arithmetic: at this many the direct sum takes an H100 some 10 ms a window, and keeps the momentum of each body.
-inline constexpr std::uint64_t kMostDirect = 100'000;
 
 template <class Real>
 class CudaGravity final : public gravity::ResidentSolver {
@@ -24,14 +21,20 @@ class CudaGravity final : public gravity::ResidentSolver {
   CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles, const mpi::Comm& comm,
               cudaStream_t stream);
 
+  /// Throws UsageError on all ranks if the device has not the memory that an evaluation takes with the particles where
+  /// they are. Collective.
+  void require_memory();
   void evaluate_and_hold(double time) override;
   [[nodiscard]] const gravity::Stats& last() const override { return stats_; }
 
  private:
-  void choose_method(unsigned particles);
+  [[nodiscard]] gravity::Layout lay_boxes();
+  [[nodiscard]] bool needs_boxes(std::uint64_t particles) const;
+  // The method to use for so many particles of all ranks; lays boxes where that or the choice needs them.
+  [[nodiscard]] gravity::MethodChoice choose_method(std::uint64_t particles, gravity::Layout& layout);
   void sum_directly(double mass_unit);
   void sum_unsplit(std::span<const BodyArrays> sets, const Extremes& extremes, double mass_unit);
-  void sum_by_mesh(const Extremes& extremes, double mass_unit);
+  void sum_by_mesh(const gravity::Layout& layout, const Extremes& extremes, double mass_unit);
   Vec3d net_force(const PredictArguments<Real>& own);
 
   GravityMethod method_;

@@ -29,33 +29,28 @@ class DeviceArray {
 
   [[nodiscard]] T* data() const { return data_; }
   [[nodiscard]] std::size_t size() const { return size_; }
+  /// The size that it can have without moving.
+  [[nodiscard]] std::size_t capacity() const { return capacity_; }
   [[nodiscard]] std::size_t bytes() const { return size_ * sizeof(T); }
 
-  /// Makes the array at least this long; what it held is lost if it grows. Some room is added: sizes change little from
-  /// sorting to sorting.
-  void reserve(std::size_t size) {
-    if (size > size_) allocate(size + size / 8);
-  }
-  /// Throws NumericsError if the device has not that much memory, with what it has.
-  void allocate(std::size_t size) {
-    free();
-    if (size == 0) return;
-    void* memory = nullptr;
-    if (cudaMalloc(&memory, size * sizeof(T)) != cudaSuccess) {
-      (void)cudaGetLastError();
-      std::size_t available = 0;
-      std::size_t total = 0;
-      check(cudaMemGetInfo(&available, &total), "memory information");
-      throw NumericsError("the device has not enough memory: " + std::to_string(size * sizeof(T)) +
-                          " bytes needed at once, " + std::to_string(available) + " of " + std::to_string(total) +
-                          " free; use more ranks with a device each, or --device host");
-    }
-    data_ = static_cast<T*>(memory);
+  /// Makes the array this long; what it held is lost if its capacity has to grow. Some room is added then: sizes change
+  /// little from sorting to sorting. Kernels may not touch that room. Throws NumericsError if the device has not that
+  /// much memory, with what it has.
+  void reserve(std::size_t size) { reserve(size, size / 8); }
+  void reserve(std::size_t size, std::size_t room) {
+    if (size > capacity_) take(size + room);
     size_ = size;
+    if (data_ != nullptr) use_only(data_, bytes());
+  }
+  /// Anew and of this size, without room. Throws as reserve().
+  void allocate(std::size_t size) {
+    take(size);
+    if (data_ != nullptr) use_only(data_, bytes());
   }
   void swap(DeviceArray& other) noexcept {
     std::swap(data_, other.data_);
     std::swap(size_, other.size_);
+    std::swap(capacity_, other.capacity_);
   }
 
   void fill_bytes(int value, cudaStream_t stream) {
@@ -78,14 +73,31 @@ class DeviceArray {
   }
 
  private:
+  void take(std::size_t size) {
+    free();
+    if (size == 0) return;
+    void* memory = nullptr;
+    if (cudaMalloc(&memory, size * sizeof(T)) != cudaSuccess) {
+      (void)cudaGetLastError();
+      std::size_t available = 0;
+      std::size_t total = 0;
+      check(cudaMemGetInfo(&available, &total), "memory information");
+      throw NumericsError("the device has not enough memory: " + std::to_string(size * sizeof(T)) +
+                          " bytes needed at once, " + std::to_string(available) + " of " + std::to_string(total) +
+                          " free; use more ranks with a device each, or --device host");
+    }
+    data_ = static_cast<T*>(memory);
+    size_ = capacity_ = size;
+  }
   void free() noexcept {
     if (data_ != nullptr) (void)cudaFree(data_);
     data_ = nullptr;
-    size_ = 0;
+    size_ = capacity_ = 0;
   }
 
   T* data_ = nullptr;
   std::size_t size_ = 0;
+  std::size_t capacity_ = 0;
 };
 
 /// Values from here and there in device memory. The host waits once.

@@ -53,6 +53,7 @@ DeviceConvolution<Real>::DeviceConvolution(const gravity::MeshSize& size, const 
       to_x_(FftKind::kForward, {{size.padded[0]}, own_y().count() * half_, own_y().count() * half_, 1}, stream),
       from_x_(FftKind::kBackward, {{size.padded[0]}, own_y().count() * half_, own_y().count() * half_, 1}, stream) {
   by_x_.allocate(volume(comm.size() > 1 ? own_x().count() : size.padded[0], size.padded[1], half_));
+  share_work_area();
   make_kernel(kernel);
   if (comm.size() == 1) return;
   by_y_.allocate(volume(size.padded[0], own_y().count(), half_));
@@ -66,6 +67,15 @@ DeviceConvolution<Real>::DeviceConvolution(const gravity::MeshSize& size, const 
   bytes_sent_ = sizeof(Complex) * (static_cast<double>(volume(own_x().count(), size.padded[1], half_)) +
                                    static_cast<double>(volume(size.nodes[0], own_y().count(), half_)) - 2.0 * here) +
                 sizeof(Real) * static_cast<double>(own_nodes_.size()) * (comm.size() - 1);
+}
+
+template <class Real>
+void DeviceConvolution<Real>::share_work_area() {
+  DeviceFft<Real>* const transforms[] = {&to_yz_, &from_yz_, &to_x_, &from_x_};
+  std::size_t most = 0;
+  for (const DeviceFft<Real>* transform : transforms) most = std::max(most, transform->work_bytes());
+  work_area_.allocate(most);
+  for (DeviceFft<Real>* transform : transforms) transform->use_work_area(work_area_.data());
 }
 
 template <class Real>

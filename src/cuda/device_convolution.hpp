@@ -31,6 +31,7 @@ class DeviceConvolution {
   [[nodiscard]] double bytes_sent() const { return bytes_sent_; }
 
  private:
+  void share_work_area();
   void make_kernel(const gravity::Kernel& kernel);
   void exchange(const Complex* send, const std::vector<int>& send_counts, Complex* receive,
                 const std::vector<int>& receive_counts);
@@ -50,6 +51,7 @@ class DeviceConvolution {
   int half_;  // complex numbers along z
   std::vector<gravity::PlaneRange> x_, y_;
   DeviceFft<Real> to_yz_, from_yz_, to_x_, from_x_;
+  DeviceArray<std::byte> work_area_;  // of all four
   int first_folded_ = 0;
   double bytes_sent_ = 0.0;
   DeviceArray<Real> kernel_;     // (folded y wave number from first_folded_, x wave number to padded/2, half)

@@ -34,25 +34,25 @@ struct Cufft<double> {
 };
 
 template <class Real>
-cufftResult make_plan(cufftHandle& plan, FftKind kind, const FftLayout& l) {
+cufftResult make_plan(cufftHandle plan, FftKind kind, const FftLayout& l, std::size_t& work_bytes) {
   using F = Cufft<Real>;
   const auto rank = static_cast<int>(l.lengths.size());
   std::vector<int> lengths = l.lengths;
   // What the library takes as the extents in memory; the first one is not looked at.
   std::vector<int> complex = lengths;
   if (kind == FftKind::kForward || kind == FftKind::kBackward) {
-    return cufftPlanMany(&plan, rank, lengths.data(), complex.data(), l.stride, l.distance, complex.data(), l.stride,
-                         l.distance, F::kBetween, l.count);
+    return cufftMakePlanMany(plan, rank, lengths.data(), complex.data(), l.stride, l.distance, complex.data(), l.stride,
+                             l.distance, F::kBetween, l.count, &work_bytes);
   }
   complex.back() = lengths.back() / 2 + 1;
   std::vector<int> real = complex;
   real.back() *= 2;
   if (kind == FftKind::kRealToComplex) {
-    return cufftPlanMany(&plan, rank, lengths.data(), real.data(), 1, 2 * l.distance, complex.data(), 1, l.distance,
-                         F::kFromReal, l.count);
+    return cufftMakePlanMany(plan, rank, lengths.data(), real.data(), 1, 2 * l.distance, complex.data(), 1, l.distance,
+                             F::kFromReal, l.count, &work_bytes);
   }
-  return cufftPlanMany(&plan, rank, lengths.data(), complex.data(), 1, l.distance, real.data(), 1, 2 * l.distance,
-                       F::kToReal, l.count);
+  return cufftMakePlanMany(plan, rank, lengths.data(), complex.data(), 1, l.distance, real.data(), 1, 2 * l.distance,
+                           F::kToReal, l.count, &work_bytes);
 }
 
 }  // namespace
@@ -61,7 +61,9 @@ template <class Real>
 DeviceFft<Real>::DeviceFft(FftKind kind, const FftLayout& layout, cudaStream_t stream)
     : kind_(kind), empty_(layout.count == 0) {
   if (empty_) return;
-  cufftResult result = make_plan<Real>(plan_, kind, layout);
+  cufftResult result = cufftCreate(&plan_);
+  if (result == CUFFT_SUCCESS) result = cufftSetAutoAllocation(plan_, 0);
+  if (result == CUFFT_SUCCESS) result = make_plan<Real>(plan_, kind, layout, work_bytes_);
   if (result == CUFFT_SUCCESS) result = cufftSetStream(plan_, stream);
   if (result == CUFFT_SUCCESS) return;
   throw UsageError("gravity mesh on the device: cuFFT makes no " + std::to_string(layout.count) +
@@ -72,6 +74,12 @@ DeviceFft<Real>::DeviceFft(FftKind kind, const FftLayout& layout, cudaStream_t s
 template <class Real>
 DeviceFft<Real>::~DeviceFft() {
   if (!empty_) cufftDestroy(plan_);
+}
+
+template <class Real>
+void DeviceFft<Real>::use_work_area(std::byte* area) {
+  if (work_bytes_ == 0) return;
+  if (cufftSetWorkArea(plan_, area) != CUFFT_SUCCESS) throw NumericsError("CUDA: cuFFT takes no work area");
 }
 
 template <class Real>

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <complex>
+#include <cstddef>
 #include <vector>
 
 #include "cuda/fft_library.hpp"
@@ -25,11 +26,15 @@ class DeviceFft {
  public:
   using Complex = std::complex<Real>;
 
-  /// Throws UsageError if the library refuses.
+  /// Without a work area. Throws UsageError if the library refuses.
   DeviceFft(gravity::FftKind kind, const FftLayout& layout, cudaStream_t stream);
   ~DeviceFft();
   DeviceFft(const DeviceFft&) = delete;
   DeviceFft& operator=(const DeviceFft&) = delete;
+
+  /// Bytes of the work area that it needs, which transforms that follow each other on a stream may share.
+  [[nodiscard]] std::size_t work_bytes() const { return work_bytes_; }
+  void use_work_area(std::byte* area);
 
   /// Enqueues the transforms of `data`, on the device.
   void operator()(Complex* data) const;
@@ -38,6 +43,7 @@ class DeviceFft {
   gravity::FftKind kind_;
   bool empty_;
   cufftHandle plan_ = 0;
+  std::size_t work_bytes_ = 0;
 };
 
 extern template class DeviceFft<float>;

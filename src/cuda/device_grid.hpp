@@ -38,6 +38,8 @@ class DeviceGrid {
   [[nodiscard]] std::vector<grid::BlockKey> block_keys(cudaStream_t stream) const {
     return block_keys_.download(blocks_, stream);
   }
+  /// Whether particles that no other can meet use no grid.
+  [[nodiscard]] bool lone_without_grid() const { return lone_without_grid_; }
   [[nodiscard]] unsigned tiles() const { return tiles_; }
   [[nodiscard]] unsigned blocks() const { return blocks_; }
   [[nodiscard]] unsigned tiled_particles() const { return tiled_; }

@@ -56,15 +56,17 @@ std::uint64_t bytes_needed(std::size_t record, const Load& load) {
   constexpr std::uint64_t tile_hash = 2 * 2 * 27 * 12;
   constexpr std::uint64_t tile = kSums * kTileNodes * real + 27 * sizeof(grid::BlockKey) + sizeof(PassSums) + 8;
   constexpr std::uint64_t block = kSums * grid::kBlockNodes * real + 27 * sizeof(unsigned);
+  // Of other ranks as much is received as is sent.
+  constexpr std::uint64_t shared = 2 * kSums * grid::kBlockNodes * real + 6 * sizeof(unsigned);
   const std::uint64_t all = load.particles * (record + sorting) + load.tiles * (tile + tile_hash) +
-                            load.blocks * block + load.flaws * sizeof(float);
+                            load.blocks * block + load.shared * shared + load.flaws * sizeof(float);
   return all + all / 8;  // room that arrays keep (DeviceArray::reserve)
 }
 
 template std::uint64_t bytes_needed<MixedPrecision>(std::size_t, const Load&);
 template std::uint64_t bytes_needed<DoublePrecision>(std::size_t, const Load&);
 
-void require_memory(std::uint64_t needed, const mpi::Comm& comm) {
+void require_memory(std::uint64_t needed, const std::string& what, const mpi::Comm& comm) {
   const cudaDeviceProp device = properties_of_this();
   const std::vector<Share> all = shares(needed, device, comm);
   std::uint64_t sum = 0;
@@ -74,9 +76,10 @@ void require_memory(std::uint64_t needed, const mpi::Comm& comm) {
   check(cudaMemGetInfo(&available, &total), "memory information");
   mpi::together<UsageError>(comm, [&] {
     if (sum <= available) return;
-    throw UsageError(std::string(device.name) + " has not enough memory: " + gigabytes(sum) + " needed by " +
-                     std::to_string(all.size()) + (all.size() == 1 ? " rank" : " ranks") + " (" + std::to_string(sum) +
-                     " bytes), " + gigabytes(available) + " available (" + std::to_string(available) +
+    throw UsageError(std::string(device.name) + " has not enough memory for " + what + ": " + gigabytes(sum) +
+                     " needed by " + std::to_string(all.size()) + (all.size() == 1 ? " rank" : " ranks") + " (" +
+                     std::to_string(sum) + " bytes), " + gigabytes(available) + " available (" +
+                     std::to_string(available) +
                      " bytes); use more devices with a rank each, fewer particles, or --device host");
   });
 }

@@ -8,8 +8,9 @@ namespace {
 // A longer array with the same values at its beginning.
 template <class T>
 void lengthen(DeviceArray<T>& array, std::size_t used, std::size_t size, cudaStream_t stream) {
-  if (size <= array.size()) return;
-  DeviceArray<T> longer(size + size / 2);
+  if (size <= array.capacity()) return array.reserve(size);
+  DeviceArray<T> longer;
+  longer.reserve(size, size / 2);
   if (used > 0) {
     check(cudaMemcpyAsync(longer.data(), array.data(), used * sizeof(T), cudaMemcpyDeviceToDevice, stream), "copy");
     check(cudaStreamSynchronize(stream), "copy");

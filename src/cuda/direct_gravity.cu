@@ -1,5 +1,3 @@
-#include <algorithm>
-
 #include "breccia/constants.hpp"
 #include "cuda/direct_gravity.hpp"
 #include "cuda/gravity_pairs.cuh"
@@ -7,9 +5,6 @@
 
 namespace breccia::cuda {
 namespace {
-
-// Thread blocks that fill any device. Few targets share out their sources among so many.
-constexpr unsigned kWantedBlocks = 1024;
 
 __device__ __forceinline__ Vec3d position_of(const BodyArrays& bodies, unsigned i) {
   return {bodies.position[0][i], bodies.position[1][i], bodies.position[2][i]};
@@ -102,9 +97,7 @@ void launch_direct_sum(const DirectArguments& a, double* acceleration, DeviceArr
                        cudaStream_t stream) {
   if (a.targets == 0) return;
   const unsigned blocks = blocks_for(a.targets, kTileSources);
-  const unsigned all_tiles = blocks_for(a.sources.count, kTileSources);
-  const unsigned tiles = blocks_for(all_tiles, std::clamp(blocks_for(kWantedBlocks, blocks), 1U, all_tiles));
-  const unsigned slices = blocks_for(all_tiles, tiles);
+  const auto [tiles, slices] = direct_slices(a.targets, a.sources.count);
   const unsigned values = 3 * a.targets;
   scratch.reserve(std::size_t{slices} * values);
   BRECCIA_LAUNCH(direct_sum<Real>, dim3(blocks, slices), dim3(kTileSources), sizeof(DirectTile<Real>), stream, a, tiles,

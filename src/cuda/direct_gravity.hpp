@@ -3,8 +3,22 @@
 
 #include "cuda/device_array.hpp"
 #include "cuda/gravity_kernels.hpp"
+#include "cuda/launchers.hpp"
 
 namespace breccia::cuda {
+
+/// How sources are shared out among thread blocks: `count` slices of `tiles` tiles each.
+struct DirectSlices {
+  unsigned tiles = 0, count = 0;
+};
+constexpr DirectSlices direct_slices(unsigned targets, unsigned sources) {
+  constexpr unsigned wanted = 1024;  // thread blocks that fill any device
+  if (targets == 0 || sources == 0) return {};
+  const unsigned all = blocks_for(sources, kTileSources);
+  const unsigned shares = blocks_for(wanted, blocks_for(targets, kTileSources));
+  const unsigned tiles = blocks_for(all, shares < all ? shares : all);
+  return {tiles, blocks_for(all, tiles)};
+}
 
 /// Targets are the sources [first, first + targets).
 struct DirectArguments {

@@ -58,6 +58,13 @@ void GravityBodies<Real>::exchange() {
 }
 
 template <class Real>
+void GravityBodies<Real>::forget() {
+  predicted_ = {};
+  gathered_ = {};
+  all_ = own_ = first_ = 0;
+}
+
+template <class Real>
 BodyArrays GravityBodies<Real>::all() const {
   const double* values = comm_.size() > 1 ? gathered_.data() : predicted_.data();
   const std::size_t stride = all_;

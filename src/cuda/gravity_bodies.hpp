@@ -23,6 +23,9 @@ class GravityBodies {
   /// Predicts this rank's particles and fetches those of the others, by way of pinned host memory. Collective.
   void gather(const PredictArguments<Real>& own);
 
+  /// Frees what gather() has taken of the device.
+  void forget();
+
   /// In the order of the ranks.
   [[nodiscard]] BodyArrays all() const;
   /// This rank's are [first, first + own) of them.

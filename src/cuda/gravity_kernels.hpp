@@ -40,6 +40,9 @@ struct PredictArguments {
 template <class Real>
 void launch_predict(const PredictArguments<Real>& a, double* to, cudaStream_t stream);
 
+/// Sources of a tile, which lie in shared memory at a time, and threads of a block of targets.
+inline constexpr unsigned kTileSources = 128;
+
 /// Sums and extremes of `count` bodies leave the device as one entry for each of so many thread blocks: equal on every
 /// device, and one for no body.
 inline constexpr unsigned kReducerThreads = 128;

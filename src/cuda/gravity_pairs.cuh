@@ -4,13 +4,10 @@
 
 #include "breccia/linalg.hpp"
 #include "breccia/math.hpp"
-#include "cuda/device_runtime.hpp"
+#include "cuda/gravity_kernels.hpp"
 #include "gravity/pair_law.hpp"
 
 namespace breccia::cuda {
-
-/// Threads of a block of targets, and sources of a tile.
-inline constexpr unsigned kTileSources = 128;
 
 __device__ __forceinline__ float inverse_root(float x) { return rsqrtf(x); }
 __device__ __forceinline__ double inverse_root(double x) { return rsqrt(x); }

@@ -3,6 +3,7 @@
 #include "breccia/error.hpp"
 #include "cuda/cuda_engine.hpp"
 #include "cuda/device_memory.hpp"
+#include "cuda/device_plan.hpp"
 #include "cuda/plugin_interface.hpp"
 
 namespace breccia::cuda {
@@ -30,7 +31,7 @@ grid::Engine* make_engine(const grid::EngineSetup& setup, const mpi::Comm& comm)
   return new CudaEngine<MixedPrecision>(setup, comm);
 }
 
-constexpr PluginInterface kInterface{BRECCIA_VERSION, &select_device, &ranks_on_device, &make_engine};
+constexpr PluginInterface kInterface{BRECCIA_VERSION, &select_device, &ranks_on_device, &memory_of, &make_engine};
 
 }  // namespace
 }  // namespace breccia::cuda

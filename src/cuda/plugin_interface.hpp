@@ -8,6 +8,9 @@ namespace breccia::cuda {
 /// Name of the library, beside the program. BRECCIA_CUDA_LIBRARY names another file.
 inline constexpr const char* kLibrary = "libbreccia_cuda.so";
 
+struct DevicePlan;
+struct DeviceMemory;
+
 struct PluginInterface {
   /// Of the program that the library was built with: classes are shared, so it must be the same.
   const char* version;
@@ -15,6 +18,8 @@ struct PluginInterface {
   const char* (*select_device)(int local_rank, std::string& name);
   /// How many ranks use the selected device. Collective.
   int (*ranks_on_device)(const mpi::Comm& comm);
+  /// What a run will take of a device (device_plan.hpp). Needs none.
+  DeviceMemory (*memory_of)(const DevicePlan& plan);
   /// On the selected device; for the caller to delete.
   grid::Engine* (*make_engine)(const grid::EngineSetup& setup, const mpi::Comm& comm);
 };

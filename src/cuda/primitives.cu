@@ -168,8 +168,8 @@ void radix_sort(DeviceArray<std::uint64_t>& keys, DeviceArray<unsigned>& values,
   static_assert(kThreads == kDigits);
   if (count == 0) return;
   const unsigned blocks = blocks_for(count, kSortBlock);
-  if (scratch.keys.size() < keys.size()) scratch.keys.allocate(keys.size());
-  if (scratch.values.size() < values.size()) scratch.values.allocate(values.size());
+  scratch.keys.reserve(count);
+  scratch.values.reserve(count);
   scratch.counts.reserve(std::size_t{kDigits} * blocks);
   for (int shift = first_bit; shift < last_bit; shift += 8) {
     BRECCIA_LAUNCH(count_digits, dim3(blocks), dim3(kThreads), sizeof(CountShared), stream, keys.data(), count, shift,

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "breccia/error.hpp"
+#include "cuda/device_plan.hpp"
 #include "cuda/plugin_interface.hpp"
 
 namespace breccia::grid {
@@ -86,6 +87,12 @@ EngineChoice choose_engine(Device wanted, const mpi::Comm& comm) {
     throw UsageError("--device cuda: " + why_not + "; use --device host or auto");
   }
   return {&make_host_engine, "host", "", plugin().in_this_build ? why_not : ""};
+}
+
+bool device_memory(const cuda::DevicePlan& plan, cuda::DeviceMemory& memory) {
+  if (plugin().interface == nullptr) return false;
+  memory = plugin().interface->memory_of(plan);
+  return true;
 }
 
 std::string describe_cuda() {

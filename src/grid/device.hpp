@@ -6,6 +6,11 @@
 
 #include "grid/engine.hpp"
 
+namespace breccia::cuda {
+struct DevicePlan;
+struct DeviceMemory;
+}  // namespace breccia::cuda
+
 namespace breccia::grid {
 
 enum class Device { kAuto, kHost, kCuda };
@@ -20,6 +25,10 @@ struct EngineChoice {
 /// The engine to use, the same on all ranks: that of this node's CUDA devices, if every rank can have one, for kAuto
 /// and kCuda. Collective. Throws UsageError if kCuda cannot be had.
 EngineChoice choose_engine(Device wanted, const mpi::Comm& comm);
+
+/// What a run will take of CUDA devices (cuda/device_plan.hpp), whether there are any or not. False: this build has no
+/// CUDA engine that could tell.
+bool device_memory(const cuda::DevicePlan& plan, cuda::DeviceMemory& memory);
 
 /// The CUDA device of this process as `breccia info` names it, or why there is none.
 std::string describe_cuda();

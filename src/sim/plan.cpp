@@ -3,10 +3,13 @@
 #include <algorithm>
 #include <chrono>
 #include <cmath>
+#include <iterator>
 
 #include "breccia/constants.hpp"
+#include "cuda/device_plan.hpp"
 #include "gravity/mesh/boxes.hpp"
 #include "gravity/method.hpp"
+#include "grid/device.hpp"
 #include "scene/bodies.hpp"
 #include "sim/setup.hpp"
 #include "sim/step_size.hpp"
@@ -49,19 +52,33 @@ std::uint64_t count_particles(const Scene& scene) {
   return total;
 }
 
+double mesh_cell(const Scene& scene) {
+  return scene.gravity.mesh > 0.0 ? scene.gravity.mesh : gravity::kCellsPerSpacing * mean_spacing(scene);
+}
+
+gravity::Box box_of(const BodyParameters& b) { return {b.position - b.semi_axes, b.position + b.semi_axes}; }
+
+// Those that the mesh cares for.
+std::vector<BodyParameters> bodies_with_mesh(const Scene& scene) {
+  double mass = 0.0;
+  for (const BodyParameters& b : scene.bodies) mass += b.mass;
+  std::vector<BodyParameters> bodies;
+  std::ranges::copy_if(scene.bodies, std::back_inserter(bodies), [&](const BodyParameters& b) {
+    return static_cast<std::int64_t>(b.particles) >= gravity::kLeastBoxParticles &&
+           b.mass >= gravity::kLeastBoxMass * mass;
+  });
+  return bodies;
+}
+
 // The matter as it starts: each body dense and by itself, those that the mesh would not care for outside.
 gravity::Matter matter_at_start(const Scene& scene) {
   double mass = 0.0;
   for (const BodyParameters& b : scene.bodies) mass += b.mass;
-  const double spacing = mean_spacing(scene);
-  const double cell = scene.gravity.mesh > 0.0 ? scene.gravity.mesh : gravity::kCellsPerSpacing * spacing;
   gravity::Matter matter{.particles = count_particles(scene)};
   std::vector<gravity::PlacedBody> bodies;
-  for (const BodyParameters& b : scene.bodies) {
-    if (static_cast<std::int64_t>(b.particles) < gravity::kLeastBoxParticles || b.mass < gravity::kLeastBoxMass * mass)
-      continue;
+  for (const BodyParameters& b : bodies_with_mesh(scene)) {
     matter.in_boxes += b.particles;
-    matter.mesh_nodes += gravity::mesh_nodes({b.position - b.semi_axes, b.position + b.semi_axes}, cell);
+    matter.mesh_nodes += gravity::mesh_nodes(box_of(b), mesh_cell(scene));
     bodies.push_back({.particles = b.particles,
                       .mass = b.mass,
                       .volume = 4.0 / 3.0 * kPi * b.semi_axes.x * b.semi_axes.y * b.semi_axes.z,
@@ -103,6 +120,44 @@ double gravity_seconds(const Scene& scene, GravityMethod method, const mpi::Comm
   return sample * ratio * (method == GravityMethod::kDirect ? ratio : std::log(all) / std::log(1.0 * kSample));
 }
 
+// Resident memory of runs of 60,000 particles beside particles and nodes [bytes]: of a particle what outputs copy and
+// sortings list, and what gravity sorts and lists; of a tile what it is found by and reaches, with thin debris.
+// Program, libraries and MPI.
+constexpr double kOutputBytes = 400.0;
+constexpr double kTreeBytes = 180.0;
+constexpr double kMeshBytes = 280.0;
+constexpr double kTileBytes = 5400.0;
+constexpr double kProgramBytes = 3.3e7;
+
+double host_bytes(const Scene& scene, const grid::EngineStats& sample, double scale, GravityMethod gravity, int ranks) {
+  const double tiles = static_cast<double>(sample.tiles) * kTileBytes;
+  const double engine = (static_cast<double>(sample.particle_bytes + sample.grid_bytes) + tiles) * scale;
+  double of_particle = kOutputBytes;
+  if (gravity == GravityMethod::kTree) of_particle += kTreeBytes;
+  if (gravity == GravityMethod::kTreePm) of_particle += kMeshBytes;
+  return kProgramBytes + (engine + of_particle * static_cast<double>(count_particles(scene))) / ranks;
+}
+
+double device_bytes(const Scene& scene, const ResolvedEffects& effects, const grid::Engine& sample, double scale,
+                    int ranks) {
+  cuda::DevicePlan plan{.setup = engine_setup(scene, effects, 1),
+                        .sample = sample.save(),
+                        .flaws = sample.flaws().threshold.size(),
+                        .scale = scale,
+                        .ranks = ranks,
+                        .gravity = effects.gravity ? effects.gravity_method : GravityMethod::kOff,
+                        .parameters = {.precision = scene.numerics.precision,
+                                       .error = scene.gravity.error,
+                                       .opening = scene.gravity.opening},
+                        .matter = matter_at_start(scene)};
+  for (const BodyParameters& b : bodies_with_mesh(scene)) {
+    plan.boxes.push_back({b.particles, gravity::MeshGeometry(box_of(b), mesh_cell(scene)).size});
+  }
+  cuda::DeviceMemory memory;
+  if (!grid::device_memory(plan, memory)) return 0.0;
+  return static_cast<double>(memory.engine + memory.gravity);
+}
+
 }  // namespace
 
 Plan make_plan(const Scene& scene) {
@@ -122,7 +177,7 @@ Plan make_plan(const Scene& scene) {
   return plan;
 }
 
-double calibrate(const Scene& scene) {
+Calibration calibrate(const Scene& scene, int ranks) {
   constexpr int kSteps = 8;
   const mpi::Comm self(MPI_COMM_SELF);
   double scale = 1.0;
@@ -136,13 +191,16 @@ double calibrate(const Scene& scene) {
     engine->gather_scatter(step);
   };
   one_step();
-  double seconds = seconds_of([&] {
-                     for (int i = 0; i < kSteps; ++i) one_step();
-                   }) /
-                   kSteps * scale;
-  if (effects.gravity)
-    seconds += gravity_seconds(scene, gravity_method(scene, effects).method, self) / scene.gravity.interval;
-  return seconds;
+  const GravityMethod gravity = gravity_method(scene, effects).method;
+  Calibration found;
+  found.seconds_per_step = seconds_of([&] {
+                             for (int i = 0; i < kSteps; ++i) one_step();
+                           }) /
+                           kSteps * scale;
+  if (effects.gravity) found.seconds_per_step += gravity_seconds(scene, gravity, self) / scene.gravity.interval;
+  found.host_bytes = host_bytes(scene, engine->stats(), scale, gravity, ranks);
+  found.device_bytes = device_bytes(scene, effects, *engine, scale, ranks);
+  return found;
 }
 
 }  // namespace breccia::sim

@@ -21,7 +21,13 @@ struct Plan {
 /// Decides the effects and the first time step of a scene.
 Plan make_plan(const Scene& scene);
 
-/// Seconds of wall time per step on this machine for this scene, from a short run of the real engine.
-double calibrate(const Scene& scene);
+/// What a short run of the real engine tells of this scene. Bytes are those of each of `ranks` ranks that share it
+/// evenly.
+struct Calibration {
+  double seconds_per_step = 0.0;  ///< wall time on one core of this machine [s]
+  double host_bytes = 0.0;        ///< of a run on the host, gravity and output included
+  double device_bytes = 0.0;      ///< of a run on CUDA devices; 0: this build has no CUDA engine
+};
+Calibration calibrate(const Scene& scene, int ranks);
 
 }  // namespace breccia::sim

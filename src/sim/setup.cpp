@@ -88,10 +88,7 @@ std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const Resol
   return make_loaded_engine(scene, effects, scene::make_particles(scene, comm), threads, comm, make);
 }
 
-namespace {
-
-std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const ResolvedEffects& effects, int threads,
-                                                const mpi::Comm& comm, grid::EngineMaker make) {
+grid::EngineSetup engine_setup(const Scene& scene, const ResolvedEffects& effects, int threads) {
   grid::EngineSetup setup;
   setup.cell = scene.cell;
   setup.materials = scene.materials;
@@ -102,15 +99,13 @@ std::unique_ptr<grid::Engine> make_empty_engine(const Scene& scene, const Resolv
   setup.numerics = scene.numerics;
   setup.threads = threads;
   setup.slab_axis = scene.parallel.axis;
-  return make(setup, comm);
+  return setup;
 }
-
-}  // namespace
 
 std::unique_ptr<grid::Engine> make_restored_engine(const Scene& scene, const ResolvedEffects& effects,
                                                    const EngineState& state, int threads, const mpi::Comm& comm,
                                                    grid::EngineMaker make) {
-  auto engine = make_empty_engine(scene, effects, threads, comm, make);
+  auto engine = make(engine_setup(scene, effects, threads), comm);
   Identities particles;
   mpi::together<IoError>(comm, [&] { particles = identities_in(state, scene); });
   const bool grows = effects.material.damage && !state.damage_finished;
@@ -121,7 +116,7 @@ std::unique_ptr<grid::Engine> make_restored_engine(const Scene& scene, const Res
 std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const ResolvedEffects& effects,
                                                  const ParticleArrays& particles, int threads, const mpi::Comm& comm,
                                                  grid::EngineMaker make) {
-  auto engine = make_empty_engine(scene, effects, threads, comm, make);
+  auto engine = make(engine_setup(scene, effects, threads), comm);
   const material::FlawLists flaws =
       effects.material.damage ? draw_all_flaws(scene, {particles.id, particles.body}) : no_flaws(particles.size());
   std::vector<Vec3d> spins;

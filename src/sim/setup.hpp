@@ -24,6 +24,9 @@ std::unique_ptr<grid::Engine> make_loaded_engine(const Scene& scene, const Resol
                                                  const ParticleArrays& particles, int threads, const mpi::Comm& comm,
                                                  grid::EngineMaker make = &grid::make_host_engine);
 
+/// What the engine of a scene is made for.
+grid::EngineSetup engine_setup(const Scene& scene, const ResolvedEffects& effects, int threads);
+
 /// Mean distance of the particles in all bodies as they are made [m]: a restarted run finds the same.
 double mean_spacing(const Scene& scene);
 

@@ -28,7 +28,7 @@ class Check(CommandTest):
         self.assertEqual(plan["time_step"], 0.25)
         self.assertIn("scene", plan["time_step_limited_by"])
         self.assertEqual((plan["steps"], plan["particles"], plan["ranks"]), (400, 400, 2))
-        self.assertAlmostEqual(plan["memory_per_rank"], plan["bytes_per_particle"] * 200)
+        self.assertGreater(plan["memory_per_rank"], plan["bytes_per_particle"] * 200)
         self.assertGreater(plan["wall_seconds"], 0)
 
     def test_effects_and_overrides(self):

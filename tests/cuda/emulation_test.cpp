@@ -36,6 +36,9 @@ TEST(Emulation, FindsSharedMemoryOverrun) {
 TEST(Emulation, FindsGlobalMemoryOverrun) {
   EXPECT_TRUE(says(error_of<Fault::kGlobalOverrun>(), "outside of an allocation"));
 }
+TEST(Emulation, FindsWritesToTheRoomOfAnArray) {
+  EXPECT_TRUE(says(error_of<Fault::kGlobalOverrun>(Order::kRandom, 8), "outside of an allocation of 4 bytes"));
+}
 #endif
 
 TEST(Emulation, CopiesAreCheckedAgainstAllocations) {

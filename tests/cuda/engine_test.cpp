@@ -6,6 +6,7 @@
 #include <cstdlib>
 
 #include "breccia/error.hpp"
+#include "cuda/device_load.hpp"
 #include "grid/setup_choices.hpp"
 #include "tests/cuda/engine_cases.hpp"
 
@@ -266,8 +267,7 @@ TEST_P(CudaEngineTest, MemoryIsKnownBefore) {
     const EngineSetup setup = setup_for(scene);
     const auto host = grid::make_host_engine(setup, self());
     fill(*host, scene);
-    const grid::EngineStats held = host->stats();
-    const Load load{held.particles, held.occupied_blocks, held.blocks, host->flaws().threshold.size()};
+    const Load load = count_load(host->save(), host->flaws().threshold.size(), {}, true, {});
     const std::uint64_t needed =
         GetParam() == Precision::kDouble
             ? bytes_needed<DoublePrecision>(DeviceParticles<DoublePrecision>(grid::groups_for(setup)).record_bytes(),
@@ -278,6 +278,8 @@ TEST_P(CudaEngineTest, MemoryIsKnownBefore) {
     const std::size_t before = cuda_emulation::most_bytes();
     cuda_emulation::forget_most_bytes();
     fill(*device, scene);
+    EXPECT_EQ(device->stats().tiles, load.tiles);
+    EXPECT_EQ(device->stats().blocks, load.blocks);
     device->scatter(0.5 * kStep);
     device->update_grid(kStep);
     device->gather(kStep);
@@ -298,7 +300,7 @@ TEST_P(CudaEngineTest, TooLittleMemoryIsSaidBefore) {
     message = error.what();
   }
   unsetenv("BRECCIA_EMULATED_MEMORY");
-  EXPECT_NE(message.find("has not enough memory"), std::string::npos) << message;
+  EXPECT_NE(message.find("has not enough memory for the particles"), std::string::npos) << message;
   EXPECT_NE(message.find(" needed by 1 rank ("), std::string::npos) << message;
   EXPECT_NE(message.find(" bytes), 0.01 GB available ("), std::string::npos) << message;
 }

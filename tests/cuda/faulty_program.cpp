@@ -21,14 +21,15 @@ int main(int count, char** arguments) {
   cudaStream_t stream = nullptr;
   void* memory = nullptr;
   cudaStreamCreate(&stream);
-  cudaMalloc(&memory, sizeof(int));
+  cudaMalloc(&memory, fault == "room_overrun" ? 4 * sizeof(int) : sizeof(int));
+  breccia::cuda_emulation::use_only(memory, sizeof(int));
   cudaMemsetAsync(memory, 0, sizeof(int), stream);
   int* total = static_cast<int*>(memory);
   if (fault == "none") run<Fault::kNone>(total, stream);
   if (fault == "no_barrier") run<Fault::kNoBarrier>(total, stream);
   if (fault == "no_atomic") run<Fault::kNoAtomic>(total, stream);
   if (fault == "overrun") run<Fault::kOverrun>(total, stream);
-  if (fault == "global_overrun") run<Fault::kGlobalOverrun>(total, stream);
+  if (fault == "global_overrun" || fault == "room_overrun") run<Fault::kGlobalOverrun>(total, stream);
   int result = 0;
   cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
   cudaStreamSynchronize(stream);

@@ -12,15 +12,16 @@ namespace breccia::cuda_test {
 inline constexpr unsigned kBlocks = 5;
 inline constexpr int kSum = static_cast<int>(kBlocks) * kThreads * (kThreads - 1) / 2;
 
-/// The sum. Throws EmulationError.
+/// The sum, in memory of so many bytes of which it uses 4. Throws EmulationError.
 template <Fault kFault>
-int run(cuda_emulation::Order order) {
+int run(cuda_emulation::Order order, std::size_t bytes = sizeof(int)) {
   using cuda_emulation::EmulationError;
   cuda_emulation::set_order(order, 7);
   cudaStream_t stream = nullptr;
   EXPECT_EQ(cudaStreamCreate(&stream), cudaSuccess);
   void* total = nullptr;
-  EXPECT_EQ(cudaMalloc(&total, sizeof(int)), cudaSuccess);
+  EXPECT_EQ(cudaMalloc(&total, bytes), cudaSuccess);
+  cuda_emulation::use_only(total, sizeof(int));
   EXPECT_EQ(cudaMemsetAsync(total, 0, sizeof(int), stream), cudaSuccess);
   int result = 0;
   std::string error;
@@ -44,9 +45,9 @@ int run(cuda_emulation::Order order) {
 
 /// What the emulation says; empty if nothing.
 template <Fault kFault>
-std::string error_of(cuda_emulation::Order order = cuda_emulation::Order::kRandom) {
+std::string error_of(cuda_emulation::Order order = cuda_emulation::Order::kRandom, std::size_t bytes = sizeof(int)) {
   try {
-    run<kFault>(order);
+    run<kFault>(order, bytes);
   } catch (const cuda_emulation::EmulationError& error) {
     return error.what();
   }

@@ -1,6 +1,7 @@
 // Fields of gravity on the emulated device and the host's for the same particles.
 #pragma once
 
+#include <cstdlib>
 #include <cstring>
 
 #include "gravity/resident.hpp"
@@ -44,6 +45,27 @@ inline std::unique_ptr<Engine> loaded(const Scene& scene, const mpi::Comm& comm)
   return engine;
 }
 
+// What an evaluation took of the devices of all ranks is known before it begins, and not much less than that is asked.
+inline void expect_memory_is_known(Engine& engine, GravityMethod method, const Parameters& parameters,
+                                   std::size_t taken, const mpi::Comm& comm) {
+  const double sum = comm.sum(static_cast<double>(taken));  // the ranks share the device
+  const auto fits_in = [&](double bytes) {
+    const auto device = cuda_emulation::used_bytes() + static_cast<std::size_t>(bytes);
+    setenv("BRECCIA_EMULATED_MEMORY", std::to_string(device).c_str(), 1);
+    bool fits = true;
+    try {
+      dynamic_cast<gravity::ResidentParticles&>(engine).make_resident_solver(method, parameters);
+    } catch (const UsageError& error) {
+      fits = false;
+      EXPECT_NE(std::string(error.what()).find("not enough memory for gravity"), std::string::npos) << error.what();
+    }
+    unsetenv("BRECCIA_EMULATED_MEMORY");
+    return fits;
+  };
+  EXPECT_FALSE(fits_in(sum - 1.0));
+  EXPECT_TRUE(fits_in(2.0 * sum)) << sum;
+}
+
 // A field on the devices of all ranks, and the same from the host's solver on one rank for the same predicted
 // positions.
 struct Fields {
@@ -54,9 +76,15 @@ struct Fields {
 inline Fields evaluate(const Scene& scene, GravityMethod method, const Parameters& parameters, const mpi::Comm& comm) {
   constexpr double ahead = 20.0;
   const auto engine = loaded(scene, comm);
-  const auto resident = dynamic_cast<gravity::ResidentParticles&>(*engine).make_resident_solver(method, parameters);
+  const std::size_t before = cuda_emulation::used_bytes();
+  cuda_emulation::forget_most_bytes();
+  auto resident = dynamic_cast<gravity::ResidentParticles&>(*engine).make_resident_solver(method, parameters);
   if (!resident) throw UsageError("the device has not this method");
   resident->evaluate_and_hold(ahead);
+  const gravity::Stats device_stats = resident->last();
+  const std::size_t taken = cuda_emulation::most_bytes() - before;
+  resident.reset();
+  expect_memory_is_known(*engine, method, parameters, taken, comm);
 
   const auto all = loaded(scene, self());
   std::vector<Vec3d> position;
@@ -69,7 +97,7 @@ inline Fields evaluate(const Scene& scene, GravityMethod method, const Parameter
   const std::vector<std::int32_t> id = ids(*all);
   for (std::size_t i = 0; i < id.size(); ++i) by_id[static_cast<std::size_t>(id[i])] = expected[i];
 
-  Fields fields{resident->last(), solver->last()};
+  Fields fields{device_stats, solver->last()};
   const std::vector<Vec3d> found = held(*engine, scene.numerics.precision);
   const std::vector<std::int32_t> found_id = ids(*engine);
   double squares = 0.0, largest_field = 0.0;

@@ -41,8 +41,13 @@ std::uint64_t synchronisation_count();
 /// Most device memory in use at a time since it was last forgotten [bytes].
 std::size_t most_bytes();
 void forget_most_bytes();
+/// Device memory in use [bytes].
+std::size_t used_bytes();
 /// Allocations of device memory that are not freed.
 std::size_t live_allocations();
+/// Of this allocation the first `bytes` are in use from now on: an access beyond is one beyond its end. Once more only
+/// what has been out of use can come into it: work that is late may still need the rest.
+void use_only(const void* memory, std::size_t bytes);
 
 /// What runs in place of a kernel: takes its parameters one behind the other, laid out as in a struct.
 struct Substitute {

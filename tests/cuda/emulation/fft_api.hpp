@@ -13,8 +13,15 @@ enum cufftType { CUFFT_R2C, CUFFT_C2R, CUFFT_C2C, CUFFT_D2Z, CUFFT_Z2D, CUFFT_Z2
 inline constexpr int CUFFT_FORWARD = -1;
 inline constexpr int CUFFT_INVERSE = 1;
 
-cufftResult cufftPlanMany(cufftHandle* plan, int rank, int* lengths, int* in_extents, int in_stride, int in_distance,
-                          int* out_extents, int out_stride, int out_distance, cufftType type, int count);
+cufftResult cufftCreate(cufftHandle* plan);
+/// The emulation never allocates: it takes 0 only.
+cufftResult cufftSetAutoAllocation(cufftHandle plan, int allocates);
+/// The work area is as large as the complex data.
+cufftResult cufftMakePlanMany(cufftHandle plan, int rank, int* lengths, int* in_extents, int in_stride, int in_distance,
+                              int* out_extents, int out_stride, int out_distance, cufftType type, int count,
+                              std::size_t* work_bytes);
+/// Must have the size that the plan asked for.
+cufftResult cufftSetWorkArea(cufftHandle plan, void* area);
 cufftResult cufftSetStream(cufftHandle plan, cudaStream_t stream);
 cufftResult cufftDestroy(cufftHandle plan);
 cufftResult cufftExecC2C(cufftHandle plan, cufftComplex* in, cufftComplex* out, int direction);

@@ -10,6 +10,10 @@
 
 #include "tests/cuda/emulation/cuda_emulation.hpp"
 
+#if defined(__SANITIZE_ADDRESS__)
+#include <sanitizer/asan_interface.h>
+#endif
+
 struct EmulatedGraph {
   std::vector<std::function<void()>> work;
   std::uint64_t launches = 0;
@@ -50,13 +54,22 @@ std::size_t device_bytes() {
 }
 #if defined(__SANITIZE_ADDRESS__)
 constexpr std::size_t kGuard = 0;  // the sanitizer sees every access beyond the end
+void forbid(const unsigned char* start, std::size_t bytes) { __asan_poison_memory_region(start, bytes); }
+void permit(const unsigned char* start, std::size_t bytes) { __asan_unpoison_memory_region(start, bytes); }
 #else
 constexpr std::size_t kGuard = 256;
+void forbid(const unsigned char*, std::size_t) {}
+void permit(const unsigned char*, std::size_t) {}
 #endif
 constexpr unsigned char kFill = 0xff;
 
+struct Allocation {
+  std::size_t bytes;
+  std::size_t used;         // the first of them
+  bool restricted = false;  // use_only() has said so
+};
 struct Memory {
-  std::map<const unsigned char*, std::size_t> allocations;
+  std::map<const unsigned char*, Allocation> allocations;
   std::size_t used = 0;
   std::size_t most = 0;          // used at any time
   std::uint64_t generation = 1;  // changes with the allocations
@@ -66,10 +79,10 @@ struct Memory {
     auto next = allocations.upper_bound(a);
     if (next == allocations.begin()) return {};
     --next;
-    if (a >= next->first + next->second) return {};
-    return {next->first, next->second};
+    if (a >= next->first + next->second.used) return {};
+    return {next->first, next->second.used};
   }
-  // Whether all of [address, address + bytes) lies in one allocation.
+  // Whether all of [address, address + bytes) lies in what is used of one allocation.
   [[nodiscard]] bool holds(const void* address, std::size_t bytes) const {
     const std::span<const unsigned char> found = around(address);
     return !found.empty() && static_cast<const unsigned char*>(address) + bytes <= found.data() + found.size();
@@ -109,7 +122,19 @@ std::uint64_t launch_count() { return launches; }
 std::uint64_t synchronisation_count() { return synchronisations; }
 std::size_t most_bytes() { return memory().most; }
 void forget_most_bytes() { memory().most = memory().used; }
+std::size_t used_bytes() { return memory().used; }
 std::size_t live_allocations() { return memory().allocations.size(); }
+
+void use_only(const void* address, std::size_t bytes) {
+  const auto* start = static_cast<const unsigned char*>(address);
+  Allocation& a = memory().allocations.at(start);
+  if (a.restricted && bytes <= a.used) return;
+  permit(start, bytes);
+  forbid(start + bytes, a.bytes - bytes);
+  a.used = bytes;
+  a.restricted = true;
+  ++memory().generation;
+}
 
 std::span<const unsigned char> allocation_of(const void* address) { return memory().around(address); }
 std::uint64_t allocation_generation() { return memory().generation; }
@@ -181,7 +206,7 @@ cudaError_t cudaMalloc(void** address, std::size_t bytes) {
   auto* start = static_cast<unsigned char*>(std::malloc(bytes + 2 * kGuard));
   if (start == nullptr) return cudaErrorMemoryAllocation;
   std::memset(start, kFill, bytes + 2 * kGuard);
-  memory().allocations[start + kGuard] = bytes;
+  memory().allocations[start + kGuard] = {.bytes = bytes, .used = bytes};
   ++memory().generation;
   memory().used += bytes;
   memory().most = std::max(memory().most, memory().used);
@@ -196,14 +221,16 @@ cudaError_t cudaFree(void* address) {
   const auto found = memory().allocations.find(static_cast<unsigned char*>(address));
   if (found == memory().allocations.end()) return cudaErrorInvalidValue;
   auto* start = static_cast<unsigned char*>(address);
-  const std::size_t bytes = found->second;
+  const std::size_t bytes = found->second.bytes, used = found->second.used;
+  permit(start, bytes);
   bool intact = true;
-  for (std::size_t n = 1; n <= kGuard; ++n) intact = intact && *(start - n) == kFill && start[bytes + n - 1] == kFill;
+  for (std::size_t n = 1; n <= kGuard; ++n) intact = intact && *(start - n) == kFill;
+  for (std::size_t n = used; n < bytes + kGuard; ++n) intact = intact && start[n] == kFill;
   memory().used -= bytes;
   memory().allocations.erase(found);
   ++memory().generation;
   std::free(start - kGuard);
-  if (!intact) throw EmulationError("a kernel wrote outside of an allocation of " + std::to_string(bytes) + " bytes");
+  if (!intact) throw EmulationError("a kernel wrote outside of an allocation of " + std::to_string(used) + " bytes");
   return cudaSuccess;
 }
 

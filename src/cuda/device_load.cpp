@@ -1,0 +1,74 @@
+#include "cuda/device_load.hpp"
+
+#include <vector>
+
+#include "grid/occupancy.hpp"
+
+namespace breccia::cuda {
+namespace {
+
+using grid::BlockCoord;
+using grid::Placement;
+
+// Along each axis, whether the block before and the one behind is reached: bits 0 and 1, 2 and 3, 4 and 5.
+unsigned sides_of(const Placement& p) {
+  unsigned sides = 0;
+  for (int axis = 0; axis < 3; ++axis) {
+    const int cell = p.node[axis] & (grid::kBlockWidth - 1);
+    if (cell < grid::kTileMargin) sides |= 1U << (2 * axis);
+    if (cell >= grid::kBlockWidth - grid::kTileMargin) sides |= 2U << (2 * axis);
+  }
+  return sides;
+}
+
+bool reaches(unsigned sides, int axis, int direction) {
+  return direction == 0 || (sides >> (2 * axis) & (direction < 0 ? 1U : 2U)) != 0;
+}
+
+void reach(BlockCoord own, unsigned sides, const grid::Periodicity& periodicity, grid::BlockTable& blocks) {
+  for (int n = 0; n < 27; ++n) {
+    const BlockCoord d{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
+    if (!reaches(sides, 0, d.x) || !reaches(sides, 1, d.y) || !reaches(sides, 2, d.z)) continue;
+    blocks.insert(grid::block_key(periodicity.wrap({own.x + d.x, own.y + d.y, own.z + d.z})));
+  }
+}
+
+}  // namespace
+
+Load count_load(const EngineState& state, std::uint64_t flaws, const grid::Periodicity& periodicity,
+                bool lone_without_grid, const OwnPlanes& planes) {
+  std::vector<Placement> placements(state.particles);
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    const std::int32_t* node = state.node.data() + 3 * i;
+    placements[i] = {static_cast<std::uint32_t>(i), {node[0], node[1], node[2]}};
+  }
+  const grid::Occupancy occupancy(placements);
+  const std::size_t occupied = occupancy.blocks().size();
+  std::vector<unsigned> sides(occupied, 0);
+  for (std::size_t i = 0; i < placements.size(); ++i) {
+    sides[occupancy.block_of_placement()[i]] |= sides_of(placements[i]);
+  }
+  const auto is_known = [&](BlockCoord there) {
+    const std::int32_t plane = grid::component(there, planes.axis);
+    return planes.low <= plane && plane < planes.high;
+  };
+  Load load{.particles = state.particles, .flaws = flaws};
+  grid::BlockTable blocks;
+  for (std::uint32_t b = 0; b < occupied; ++b) {
+    if (lone_without_grid && occupancy.is_alone(b, periodicity, is_known)) continue;
+    ++load.tiles;
+    reach(grid::block_coord(occupancy.blocks()[b].block), sides[b], periodicity, blocks);
+  }
+  load.blocks = blocks.size();
+  for (const grid::BlockKey key : blocks.keys()) {
+    const BlockCoord block = grid::block_coord(key);
+    for (const int side : {-1, 1}) {
+      BlockCoord there = block;
+      (planes.axis == 0 ? there.x : planes.axis == 1 ? there.y : there.z) += side;
+      if (!is_known(block) || !is_known(periodicity.wrap(there))) ++load.shared;
+    }
+  }
+  return load;
+}
+
+}  // namespace breccia::cuda
