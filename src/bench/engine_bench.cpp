@@ -75,7 +75,7 @@ Measured measure(const Row& row, Precision precision, int threads, double second
     spent += elapsed;
   }
   const grid::EngineStats stats = engine->stats();
-  best.bytes_per_particle = static_cast<double>(comm.sum(stats.particle_bytes + stats.grid_bytes)) /
+  best.bytes_per_particle = static_cast<double>(comm.sum(stats.particle_bytes + stats.grid_bytes + stats.sort_bytes)) /
                             static_cast<double>(comm.sum(stats.particles));
   return best;
 }

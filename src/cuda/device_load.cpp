@@ -8,13 +8,12 @@ namespace breccia::cuda {
 namespace {
 
 using grid::BlockCoord;
-using grid::Placement;
 
 // Along each axis, whether the block before and the one behind is reached: bits 0 and 1, 2 and 3, 4 and 5.
-unsigned sides_of(const Placement& p) {
+unsigned sides_of(const std::int32_t (&node)[3]) {
   unsigned sides = 0;
   for (int axis = 0; axis < 3; ++axis) {
-    const int cell = p.node[axis] & (grid::kBlockWidth - 1);
+    const int cell = node[axis] & (grid::kBlockWidth - 1);
     if (cell < grid::kTileMargin) sides |= 1U << (2 * axis);
     if (cell >= grid::kBlockWidth - grid::kTileMargin) sides |= 2U << (2 * axis);
   }
@@ -37,17 +36,16 @@ void reach(BlockCoord own, unsigned sides, const grid::Periodicity& periodicity,
 
 Load count_load(const EngineState& state, std::uint64_t flaws, const grid::Periodicity& periodicity,
                 bool lone_without_grid, const OwnPlanes& planes) {
-  std::vector<Placement> placements(state.particles);
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    const std::int32_t* node = state.node.data() + 3 * i;
-    placements[i] = {static_cast<std::uint32_t>(i), {node[0], node[1], node[2]}};
+  grid::Occupancy occupancy;
+  std::vector<unsigned> sides;  // by block
+  for (std::size_t i = 0; i < state.particles; ++i) {
+    const std::int32_t* of_particle = state.node.data() + 3 * i;
+    const std::int32_t node[3] = {of_particle[0], of_particle[1], of_particle[2]};
+    const std::uint32_t block = occupancy.add(node).block;
+    sides.resize(occupancy.blocks().size(), 0U);
+    sides[block] |= sides_of(node);
   }
-  const grid::Occupancy occupancy(placements);
   const std::size_t occupied = occupancy.blocks().size();
-  std::vector<unsigned> sides(occupied, 0);
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    sides[occupancy.block_of_placement()[i]] |= sides_of(placements[i]);
-  }
   const auto is_known = [&](BlockCoord there) {
     const std::int32_t plane = grid::component(there, planes.axis);
     return planes.low <= plane && plane < planes.high;

@@ -27,11 +27,32 @@ bool exists(const grid::GroupSet& groups, grid::Group group) {
   }
 }
 
+template <class P>
+std::vector<grid::FieldDescriptor> make_device_fields() {
+  std::vector<grid::FieldDescriptor> fields;
+  for (const grid::FieldDescriptor& f : grid::fields<P>()) {
+    if (f.name != std::string_view("flaw_state")) {
+      fields.push_back(f);
+      continue;
+    }
+    fields.push_back({"flaw_count", "", "active + 65536 * all", f.group, 0, 4, 1});
+    fields.push_back({"next_threshold", "", "strain that activates the next flaw", f.group, 0,
+                      static_cast<int>(sizeof(typename P::Real)), 1});
+  }
+  return fields;
+}
+
 }  // namespace
 
 template <class P>
+std::span<const grid::FieldDescriptor> device_fields() {
+  static const std::vector<grid::FieldDescriptor> table = make_device_fields<P>();
+  return table;
+}
+
+template <class P>
 DeviceParticles<P>::DeviceParticles(const grid::GroupSet& groups) : groups_(groups) {
-  for (const grid::FieldDescriptor& descriptor : grid::fields<P>()) {
+  for (const grid::FieldDescriptor& descriptor : device_fields<P>()) {
     if (exists(groups_, descriptor.group)) fields_.push_back({&descriptor, {}});
   }
 }
@@ -238,6 +259,8 @@ void DeviceParticles<P>::drop_damage() {
   std::erase_if(fields_, [&](const Field& field) { return !exists(groups_, field.descriptor->group); });
 }
 
+template std::span<const grid::FieldDescriptor> device_fields<MixedPrecision>();
+template std::span<const grid::FieldDescriptor> device_fields<DoublePrecision>();
 template class DeviceParticles<MixedPrecision>;
 template class DeviceParticles<DoublePrecision>;
 template std::vector<float> DeviceParticles<MixedPrecision>::download_component(std::string_view, int,

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstddef>
+#include <span>
 #include <string_view>
 #include <vector>
 
@@ -13,6 +14,11 @@ namespace breccia::cuda {
 
 /// Of each particle, so many bytes are rearranged at once and need room beside it.
 inline constexpr std::size_t kRearrangedBytes = 32;
+
+/// The fields of grid::fields, but with the state of the flaws in two words: the threshold of the next in full, as
+/// every step reads it.
+template <class P>
+std::span<const grid::FieldDescriptor> device_fields();
 
 template <class P>
 class DeviceParticles {

@@ -58,7 +58,7 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
   a.velocities = velocities_.data();
   a.sums = sums_.data();
   a.rows = rows_.data();
-  a.flaw_thresholds = flaw_thresholds_.data();
+  a.flaw_codes = flaw_codes_.data();
   a.fault = &fault_;
   a.materials = constants_.data();
   a.material_count = static_cast<int>(constants_.size());

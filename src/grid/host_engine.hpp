@@ -96,20 +96,28 @@ class HostEngine final : public Engine {
     if (timeline_ != nullptr) timeline_->add(name, lane, begin, end);
   }
 
-  // Sorting and migration (host_engine_sort.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
-  void settle(std::vector<Placement> placements);
+  // Sorting and migration (host_engine_sort.cpp, _migrate.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
+  void settle(std::span<const Placement> placements);
+  template <class F>
+  void settle_each(F&& for_each_placement);  // visits them: memory for all of them is not needed
   void choose_slabs(std::span<const Placement> placements);
   [[nodiscard]] Placement place(std::size_t slot, BlockCoord stack) const;  // of a particle that has moved
   [[nodiscard]] double work_of_periods() const;  // of the uniform field, before particles are put back
   [[nodiscard]] std::vector<Placement> place_all() const;
-  void migrate(std::vector<Placement>& placements);
+  void require_in_grid() const;
+  void set_destination(BlockCell cell, std::size_t slot);
+  void put_record(const Placement& p, std::vector<std::byte>& message);  // of a particle that leaves
+  void take_records(const std::vector<std::vector<std::byte>>& messages, Occupancy& occupancy);
   [[nodiscard]] std::vector<char> find_lone(Occupancy& occupancy) const;  // for each block of it
   void tell_neighbours(Occupancy& occupancy) const;                       // of what this rank's blocks hold
   // By more than a node since the last sorting: other ranks know of no node that far.
   [[nodiscard]] bool boundary_strayed() const;
   [[nodiscard]] bool has_drifted(std::size_t slot, std::int32_t sorted_node) const;
   [[nodiscard]] bool lone_strayed() const;  // more than a node since the last sorting
-  void arrange(std::span<const Placement> placements);
+  template <class F>
+  void for_each_destination(F&& visit) const;
+  void arrange(Occupancy& occupancy);
+  void lay_out_tiles(std::span<std::uint32_t> place, std::uint32_t alone);
   [[nodiscard]] std::vector<std::uint32_t> find_tiles(const Occupancy& occupancy, std::span<const char> lone);
   void connect_tiles();
   void insert_stacks();
@@ -126,6 +134,7 @@ class HostEngine final : public Engine {
   std::vector<Placement> restore_places(const EngineState& state);
   void restore_field(const FieldDescriptor& field, const EngineState& state);
   void restore_flaws(const EngineState& state, const material::FlawLists& flaws);
+  void take_flaws(const material::FlawLists& flaws);  // into the arena
   // The flaws of list `row` become those of `slot`; the first `active` of them grow already.
   void set_flaws(std::size_t slot, const material::FlawLists& flaws, std::size_t row, std::uint32_t active);
 
@@ -163,6 +172,7 @@ class HostEngine final : public Engine {
   }
   [[nodiscard]] std::uint64_t id(std::size_t slot) const;
   [[nodiscard]] std::uint32_t material(std::size_t slot) const;
+  [[nodiscard]] std::span<const material::FlawCode> flaws_of(std::size_t slot) const;
   [[nodiscard]] double hencky_norm(std::size_t slot) const;  // |dev h| of the elastic strain
 
   EngineSetup setup_;
@@ -175,7 +185,7 @@ class HostEngine final : public Engine {
   TransferParameters transfer_;
 
   ParticleStore<P> store_;
-  std::vector<float> flaw_thresholds_;
+  std::vector<material::FlawCode> flaw_codes_;
   std::vector<Tile> tiles_;
   std::vector<BlockKey> stacks_;               // lowest block of each tile
   std::size_t occupied_blocks_ = 0;            // of the tiles
@@ -207,8 +217,9 @@ class HostEngine final : public Engine {
   bool shared_updated_ = false;   // since the sums were sent
   Timeline* timeline_ = nullptr;  // of the run; null: none wanted
   PassReport report_;
-  std::uint64_t gathers_ = 0;  // since the last sorting
-  PassFault fault_;            // of the last pass
+  std::uint64_t gathers_ = 0;   // since the last sorting
+  std::size_t sort_bytes_ = 0;  // held by the last sorting beside the particles
+  PassFault fault_;             // of the last pass
 };
 
 extern template class HostEngine<MixedPrecision>;

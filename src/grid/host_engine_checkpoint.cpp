@@ -55,7 +55,7 @@ void HostEngine<P>::save_flaws(std::span<const Placement> placements, EngineStat
   for (const Placement& p : placements) {
     const Flaws<P>& f = store_.flaws[p.slot / kLanes];
     const int lane = static_cast<int>(p.slot % kLanes);
-    const auto growing = static_cast<std::uint32_t>(f.count[lane] & 0xffff);
+    const auto growing = static_cast<std::uint32_t>(FlawState::of(f.state[lane]).active);
     const auto* bytes = reinterpret_cast<const std::byte*>(&growing);
     active.values.insert(active.values.end(), bytes, bytes + sizeof growing);
   }
@@ -68,10 +68,7 @@ material::FlawLists HostEngine<P>::flaws() const {
   lists.first.push_back(0);
   for_each_particle([&](std::size_t slot, BlockCoord) {
     if (store_.has(Group::kFlaws)) {
-      const Flaws<P>& f = store_.flaws[slot / kLanes];
-      const int lane = static_cast<int>(slot % kLanes);
-      const auto own = flaw_thresholds_.begin() + f.first[lane];
-      lists.threshold.insert(lists.threshold.end(), own, own + (f.count[lane] >> 16));
+      for (const material::FlawCode code : flaws_of(slot)) lists.threshold.push_back(material::threshold_of(code));
     }
     lists.first.push_back(static_cast<std::uint32_t>(lists.threshold.size()));
   });
@@ -98,7 +95,7 @@ void HostEngine<P>::restore(const EngineState& state, const material::FlawLists&
   } else {
     choose_slabs(placements);
   }
-  settle(std::move(placements));
+  settle(placements);
 }
 
 template <class P>
@@ -135,7 +132,7 @@ void HostEngine<P>::restore_field(const FieldDescriptor& field, const EngineStat
 template <class P>
 void HostEngine<P>::restore_flaws(const EngineState& state, const material::FlawLists& flaws) {
   const std::byte* active = find_column(state, kActiveFlaws, 4, 1).values.data();
-  flaw_thresholds_ = flaws.threshold;
+  take_flaws(flaws);
   for (std::size_t i = 0; i < state.particles; ++i) {
     std::uint32_t growing = 0;
     std::memcpy(&growing, active + i * sizeof growing, sizeof growing);

@@ -154,17 +154,17 @@ void HostEngine<P>::connect_tiles() {
 
 template <class P>
 void HostEngine<P>::make_room() {
-  // The grid update has cleared every sum. Old velocities stay where they are: only nodes that a scatter has reached
-  // since are read.
+  constexpr std::size_t kBlockReals = kBlockNodes * kChannels;
   const std::size_t blocks = std::max(blocks_.size(), ordered_.blocks());
-  const auto grow = [](LargeArray<Real>& array, std::size_t of_blocks) {
-    const std::size_t nodes = of_blocks * kBlockNodes * kChannels;
-    // Some room for the next sortings, not twice as much as push_back would take.
-    if (nodes > array.capacity()) array.reserve(nodes + nodes / 16);
-    array.resize(nodes, Real(0));
-  };
-  grow(sums_, blocks);
-  grow(velocities_, blocks_.size());
+  if (blocks * kBlockReals > sums_.capacity()) {
+    // The grid update has cleared every sum, so none is to be kept; some room for the next sortings.
+    sums_ = {};
+    sums_.reserve((blocks + blocks / 32) * kBlockReals);
+  }
+  sums_.resize(blocks * kBlockReals, Real(0));
+  // Read are velocities of nodes that a scatter has reached since, and with weight 0 those beside them.
+  velocities_.reserve(blocks_.size() * kBlockReals);  // else it might grow to twice that
+  velocities_.resize(blocks_.size() * kBlockReals, Real(0));
   rows_.assign(blocks, RowMask{});
 }
 

@@ -33,7 +33,7 @@ void HostEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
                            std::span<const Vec3d> spin_of_body) {
   const std::size_t count = particles.size();
   store_.allocate((count + kLanes - 1) / kLanes);
-  flaw_thresholds_ = flaws.threshold;
+  take_flaws(flaws);
   double lightest = std::numeric_limits<double>::infinity();
   bool too_far = false;
   std::vector<Placement> placements(count);
@@ -76,19 +76,34 @@ void HostEngine<P>::insert(const ParticleArrays& particles, const material::Flaw
   }
   smallest_mass_ = comm_.min(lightest);
   choose_slabs(placements);
-  settle(std::move(placements));
+  settle(placements);
+}
+
+template <class P>
+void HostEngine<P>::take_flaws(const material::FlawLists& flaws) {
+  flaw_codes_.resize(flaws.threshold.size());
+  std::ranges::transform(flaws.threshold, flaw_codes_.begin(),
+                         [](float strain) { return material::flaw_code(strain); });
+}
+
+template <class P>
+std::span<const material::FlawCode> HostEngine<P>::flaws_of(std::size_t slot) const {
+  const Flaws<P>& f = store_.flaws[slot / kLanes];
+  const int lane = static_cast<int>(slot % kLanes);
+  return std::span(flaw_codes_)
+      .subspan(static_cast<std::size_t>(f.first[lane]), static_cast<std::size_t>(FlawState::of(f.state[lane]).all));
 }
 
 template <class P>
 void HostEngine<P>::set_flaws(std::size_t slot, const material::FlawLists& flaws, std::size_t row,
                               std::uint32_t active) {
-  const auto all = static_cast<std::uint32_t>(std::min<std::size_t>(flaws.of(row).size(), 0x7fff));
+  const auto all = static_cast<std::uint32_t>(std::min<std::size_t>(flaws.of(row).size(), FlawState::kMostFlaws));
   if (active > all) throw IoError("more flaws grow than the particle has");
   Flaws<P>& f = store_.flaws[slot / kLanes];
   const int lane = static_cast<int>(slot % kLanes);
   f.first.set(lane, static_cast<std::int32_t>(flaws.first[row]));
-  f.count.set(lane, static_cast<std::int32_t>(active | all << 16));
-  f.next_threshold.set(lane, active < all ? static_cast<Real>(flaws.of(row)[active]) : Real(1e30));
+  const material::FlawCode next = active < all ? flaw_codes_[flaws.first[row] + active] : material::kNeverGrows;
+  f.state.set(lane, FlawState{static_cast<std::int32_t>(active), static_cast<std::int32_t>(all), next}.packed());
 }
 
 template class HostEngine<MixedPrecision>;

@@ -197,8 +197,10 @@ EngineStats HostEngine<P>::stats() const {
       stats.particle_bytes += store_.packs() * ParticleStore<P>::stride(static_cast<Group>(g));
     }
   }
-  stats.particle_bytes += flaw_thresholds_.capacity() * sizeof(float) + lone_pull_.capacity() * sizeof(LonePull<P>);
+  stats.particle_bytes +=
+      flaw_codes_.capacity() * sizeof(material::FlawCode) + lone_pull_.capacity() * sizeof(LonePull<P>);
   stats.grid_bytes = (sums_.capacity() + velocities_.capacity()) * sizeof(Real);
+  stats.sort_bytes = sort_bytes_;
   return stats;
 }
 

@@ -1,12 +1,10 @@
 // Sorting: every particle to the rank that owns its node, to its tile, and inside the tile to the order of its cell.
 #include <algorithm>
-#include <cstring>
 #include <string>
 #include <utility>
 
 #include "breccia/error.hpp"
 #include "grid/host_engine.hpp"
-#include "mpi/message.hpp"
 #include "mpi/together.hpp"
 
 namespace breccia::grid {
@@ -17,8 +15,6 @@ constexpr std::int32_t floor_div4(std::int32_t n) { return n >> 2; }
 // Cells from the lowest of a stack.
 struct CellInStack {
   int x, y, z;
-  explicit constexpr CellInStack(const std::int32_t (&node)[3])
-      : x(node[0] & (kBlockWidth - 1)), y(node[1] & (kBlockWidth - 1)), z(node[2] & (kStackHeight - 1)) {}
   // In storage order: z slowest, so that consecutive particles write to different rows of nodes.
   [[nodiscard]] constexpr std::uint32_t index() const {
     return static_cast<std::uint32_t>((z * kBlockWidth + y) * kBlockWidth + x);
@@ -29,9 +25,6 @@ struct CellInStack {
 };
 
 constexpr std::uint32_t kNoTile = kNoBlock;
-
-using mpi::get;
-using mpi::put;
 
 }  // namespace
 
@@ -56,27 +49,27 @@ Placement HostEngine<P>::place(std::size_t slot, BlockCoord stack) const {
 }
 
 template <class P>
-std::vector<Placement> HostEngine<P>::place_all() const {
-  std::vector<std::size_t> first(tiles_.size() + 1, 0);
-  for (std::size_t t = 0; t < tiles_.size(); ++t) first[t + 1] = first[t] + tiles_[t].particles;
-  std::vector<Placement> placements(first.back() + lone_.particles);
-#pragma omp parallel for schedule(static) num_threads(setup_.threads)
-  for (std::size_t t = 0; t < tiles_.size(); ++t) {
-    const BlockCoord stack = block_coord(stacks_[t]);
-    for (std::uint32_t n = 0; n < tiles_[t].particles; ++n) {
-      placements[first[t] + n] = place(tiles_[t].first_pack * kLanes + n, stack);
+void HostEngine<P>::require_in_grid() const {
+  for_each_particle([&](std::size_t slot, BlockCoord stack) {
+    bool inside = true;
+    for (int axis = 0; axis < 3; ++axis) {
+      inside = inside && std::abs(component(stack, axis)) < kBlockLimit - kStackBlocks - 1;
     }
-  }
-  for (std::uint32_t n = 0; n < lone_.particles; ++n) {
-    placements[first.back() + n] = place(lone_.first_pack * kLanes + n, lone_stack_[n]);
-  }
-  for (const Placement& p : placements) {
-    for (const std::int32_t node : p.node) {
+    if (inside) return;
+    for (const std::int32_t node : place(slot, stack).node) {
       if (std::abs(floor_div4(node)) > kBlockLimit) {
-        throw NumericsError("particle " + std::to_string(id(p.slot)) + " is more than 4 million cells from the origin");
+        throw NumericsError("particle " + std::to_string(id(slot)) + " is more than 4 million cells from the origin");
       }
     }
-  }
+  });
+}
+
+template <class P>
+std::vector<Placement> HostEngine<P>::place_all() const {
+  require_in_grid();
+  std::vector<Placement> placements;
+  placements.reserve(store_.packs() * kLanes);
+  for_each_particle([&](std::size_t slot, BlockCoord stack) { placements.push_back(place(slot, stack)); });
   return placements;
 }
 
@@ -94,66 +87,47 @@ double HostEngine<P>::work_of_periods() const {
 template <class P>
 double HostEngine<P>::sort() {
   if (comm_.any(strayed())) throw NumericsError("particles moved more than a cell between two sortings");
-  std::vector<Placement> placements;
-  mpi::together<NumericsError>(comm_, [&] { placements = place_all(); });
+  mpi::together<NumericsError>(comm_, [&] { require_in_grid(); });
   const double work = work_of_periods();
-  settle(std::move(placements));
+  settle_each(
+      [&](auto&& visit) { for_each_particle([&](std::size_t slot, BlockCoord stack) { visit(place(slot, stack)); }); });
   return work;
 }
 
 template <class P>
-void HostEngine<P>::settle(std::vector<Placement> placements) {
-  migrate(placements);
-  arrange(placements);
+void HostEngine<P>::settle(std::span<const Placement> placements) {
+  settle_each([&](auto&& visit) { std::ranges::for_each(placements, visit); });
+}
+
+template <class P>
+template <class F>
+void HostEngine<P>::settle_each(F&& for_each_placement) {
+  // Velocities follow from the next scatter. Where nodes are few beside particles, it costs little to clear them anew,
+  // and their memory is room for the places of particles.
+  const std::size_t of_nodes = velocities_.capacity() * sizeof(Real);
+  const bool given_back = 8 * of_nodes < store_.packs() * kLanes * store_.record_bytes();
+  if (given_back) velocities_ = {};
+  Occupancy occupancy;
+  std::vector<std::vector<std::byte>> leaving(static_cast<std::size_t>(comm_.size()));
+  for_each_placement([&](const Placement& p) {
+    const int rank = comm_.size() == 1 ? 0 : owner(p);
+    if (rank == comm_.rank()) {
+      set_destination(occupancy.add(p.node), p.slot);
+    } else {
+      put_record(p, leaving[static_cast<std::size_t>(rank)]);
+    }
+  });
+  if (comm_.size() > 1) take_records(comm_.alltoall(leaving), occupancy);
+  arrange(occupancy);
+  if (given_back) sort_bytes_ -= std::min(sort_bytes_, of_nodes);
   connect_tiles();
   report_ = {};
   gathers_ = 0;
 }
 
 template <class P>
-void HostEngine<P>::migrate(std::vector<Placement>& placements) {
-  if (comm_.size() == 1) return;
-  const bool with_flaws = store_.has(Group::kFlaws);
-  const std::size_t bytes = store_.record_bytes();
-  std::vector<std::vector<std::byte>> to(static_cast<std::size_t>(comm_.size()));
-  std::vector<std::byte> record(bytes);
-  std::erase_if(placements, [&](const Placement& p) {
-    const int rank = owner(p);
-    if (rank == comm_.rank()) return false;
-    auto& message = to[static_cast<std::size_t>(rank)];
-    put(message, p.node, 3);
-    store_.read_record(p.slot, record.data());
-    put(message, record.data(), bytes);
-    if (with_flaws) {
-      const Flaws<P>& f = store_.flaws[p.slot / kLanes];
-      const int lane = static_cast<int>(p.slot % kLanes);
-      put(message, flaw_thresholds_.data() + f.first[lane], static_cast<std::size_t>(f.count[lane] >> 16));
-    }
-    return true;
-  });
-  for (const std::vector<std::byte>& message : comm_.alltoall(to)) {
-    const std::byte* from = message.data();
-    const std::byte* const end = from + message.size();
-    while (from != end) {
-      // A pack at a time: slots are cheap until arrange() closes the gaps.
-      const std::size_t slot = store_.packs() * kLanes;
-      store_.append_packs(1);
-      for (std::size_t lane = 0; lane < kLanes && from != end; ++lane) {
-        Placement p{static_cast<std::uint32_t>(slot + lane), {}};
-        get(from, p.node, 3);
-        store_.write_record(p.slot, from);
-        from += bytes;
-        if (with_flaws) {
-          Flaws<P>& f = store_.flaws[p.slot / kLanes];
-          const auto count = static_cast<std::size_t>(f.count[static_cast<int>(lane)] >> 16);
-          f.first.set(static_cast<int>(lane), static_cast<std::int32_t>(flaw_thresholds_.size()));
-          flaw_thresholds_.resize(flaw_thresholds_.size() + count);
-          get(from, flaw_thresholds_.data() + flaw_thresholds_.size() - count, count);
-        }
-        placements.push_back(p);
-      }
-    }
-  }
+void HostEngine<P>::set_destination(BlockCell cell, std::size_t slot) {
+  store_.kinematics[slot / kLanes].node.set(static_cast<int>(slot % kLanes), cell.packed());
 }
 
 // The tile of each block of particles in the order of their stacks, kNoTile where its particle is alone.
@@ -179,30 +153,79 @@ std::vector<std::uint32_t> HostEngine<P>::find_tiles(const Occupancy& occupancy,
   return tile_of_block;
 }
 
+// Calls visit(slot, cell) for the particles that have been sent to a cell, in the order of their slots.
 template <class P>
-void HostEngine<P>::arrange(std::span<const Placement> placements) {
-  Occupancy occupancy(placements);
+template <class F>
+void HostEngine<P>::for_each_destination(F&& visit) const {
+  for (std::size_t p = 0; p < store_.packs(); ++p) {
+    const Kinematics<P>& k = store_.kinematics[p];
+    for (std::size_t l = 0; l < kLanes; ++l) {
+      const int lane = static_cast<int>(l);
+      if (k.mass[lane] > Real(0)) visit(p * kLanes + l, BlockCell::of(k.node[lane]));
+    }
+  }
+}
+
+template <class P>
+void HostEngine<P>::arrange(Occupancy& occupancy) {
   const std::vector<char> lone = find_lone(occupancy);
   const std::vector<std::uint32_t> tile_of_block = find_tiles(occupancy, lone);
-  const auto tile_of = [&](std::size_t i) { return tile_of_block[occupancy.block_of_placement()[i]]; };
+  // The lowest bits of a key are those of z.
+  const auto in_stack = [&](const BlockCell& cell) {
+    const auto block_in_stack = static_cast<int>(occupancy.blocks()[cell.block].block % kStackBlocks);
+    return CellInStack{cell.x, cell.y, cell.z + kBlockWidth * block_in_stack};
+  };
 
   // A counting sort over (tile, cell): it is stable.
   std::vector<std::uint32_t> place(stacks_.size() * kStackCells, 0U);
   occupied_cells_.assign(stacks_.size(), OccupiedCells{});
   std::uint32_t alone = 0;
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    const std::uint32_t t = tile_of(i);
+  for_each_destination([&](std::size_t, const BlockCell& to) {
+    const std::uint32_t t = tile_of_block[to.block];
     if (t == kNoTile) {
       ++alone;
-      continue;
+      return;
     }
-    const CellInStack cell(placements[i].node);
+    const CellInStack cell = in_stack(to);
     ++place[std::size_t{t} * kStackCells + cell.index()];
     OccupiedCells& occupied = occupied_cells_[t];
     occupied.axis[0] = static_cast<std::uint16_t>(occupied.axis[0] | 1U << cell.x);
     occupied.axis[1] = static_cast<std::uint16_t>(occupied.axis[1] | 1U << cell.y);
     occupied.axis[2] = static_cast<std::uint16_t>(occupied.axis[2] | 1U << cell.z);
+  });
+  lay_out_tiles(place, alone);
+
+  std::vector<std::uint32_t> source((lone_.first_pack + packs_for(alone)) * kLanes, ParticleStore<P>::kEmpty);
+  lone_stack_.clear();
+  lone_node_.clear();
+  for_each_destination([&](std::size_t from, const BlockCell& to) {
+    const CellInStack cell = in_stack(to);
+    const std::uint32_t t = tile_of_block[to.block];
+    std::size_t slot = lone_.first_pack * kLanes + lone_stack_.size();
+    if (t != kNoTile) {
+      slot = place[std::size_t{t} * kStackCells + cell.index()]++;
+    } else {
+      lone_stack_.push_back(stack_of(block_coord(occupancy.blocks()[to.block].block)));
+      lone_node_.push_back(cell.packed());
+    }
+    source[slot] = static_cast<std::uint32_t>(from);
+    store_.kinematics[from / kLanes].node.set(static_cast<int>(from % kLanes), cell.packed());
+  });
+  if (setup_.numerics.reproducible) sort_cells_by_id(source, place);
+  lone_pull_.resize(packs_for(alone));
+  const std::size_t beside = store_.gather(source, setup_.threads);
+  sort_bytes_ = (source.capacity() + place.capacity()) * sizeof(std::uint32_t) + beside;
+  // Empty lanes take part in the passes, with mass 0, so they need a node as well.
+  for (std::size_t slot = 0; slot < source.size(); ++slot) {
+    if (source[slot] != ParticleStore<P>::kEmpty) continue;
+    store_.kinematics[slot / kLanes].node.set(static_cast<int>(slot % kLanes), CellInStack{0, 0, 0}.packed());
   }
+  if (store_.has(Group::kFlaws)) compact_flaws();
+}
+
+// Tiles and lone particles one after the other; of the numbers of particles in each cell become their first slots.
+template <class P>
+void HostEngine<P>::lay_out_tiles(std::span<std::uint32_t> place, std::uint32_t alone) {
   tiles_.assign(stacks_.size(), Tile{});
   boxes_.assign(stacks_.size(), kWholeTile);
   std::uint32_t packs = 0;
@@ -217,31 +240,6 @@ void HostEngine<P>::arrange(std::span<const Placement> placements) {
     packs += packs_for(tiles_[t].particles);
   }
   lone_ = {packs, alone};
-  packs += packs_for(alone);
-
-  std::vector<std::uint32_t> source(packs * kLanes, ParticleStore<P>::kEmpty);
-  std::vector<std::int32_t> node(source.size(), CellInStack({0, 0, 0}).packed());
-  lone_stack_.clear();
-  lone_node_.clear();
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    const CellInStack cell(placements[i].node);
-    const std::uint32_t t = tile_of(i);
-    std::size_t slot = lone_.first_pack * kLanes + lone_stack_.size();
-    if (t != kNoTile) {
-      slot = place[std::size_t{t} * kStackCells + cell.index()]++;
-    } else {
-      lone_stack_.push_back(stack_of(block_of(placements[i])));
-      lone_node_.push_back(cell.packed());
-    }
-    source[slot] = placements[i].slot;
-    node[slot] = cell.packed();
-  }
-  if (setup_.numerics.reproducible) sort_cells_by_id(source, place);
-  lone_pull_.resize(packs_for(alone));
-  store_.gather(source, setup_.threads);
-  for (std::size_t s = 0; s < node.size(); ++s)
-    store_.kinematics[s / kLanes].node.set(static_cast<int>(s % kLanes), node[s]);
-  if (store_.has(Group::kFlaws)) compact_flaws();
 }
 
 template <class P>
@@ -256,26 +254,6 @@ void HostEngine<P>::sort_cells_by_id(std::span<std::uint32_t> source, std::span<
       first = last;
     }
   }
-}
-
-template <class P>
-void HostEngine<P>::compact_flaws() {
-  if (comm_.size() == 1) return;  // none has gone
-  std::size_t live = 0;
-  for_each_particle([&](std::size_t slot, BlockCoord) {
-    live += static_cast<std::size_t>(store_.flaws[slot / kLanes].count[static_cast<int>(slot % kLanes)] >> 16);
-  });
-  if (flaw_thresholds_.size() <= 2 * live) return;
-  std::vector<float> kept;
-  kept.reserve(live);
-  for_each_particle([&](std::size_t slot, BlockCoord) {
-    Flaws<P>& f = store_.flaws[slot / kLanes];
-    const int lane = static_cast<int>(slot % kLanes);
-    const auto first = flaw_thresholds_.begin() + f.first[lane];
-    f.first.set(lane, static_cast<std::int32_t>(kept.size()));
-    kept.insert(kept.end(), first, first + (f.count[lane] >> 16));
-  });
-  flaw_thresholds_ = std::move(kept);
 }
 
 template <class P>
@@ -295,7 +273,7 @@ void HostEngine<P>::switch_damage_off() {
   setup_.effects.damage = false;
   setup_.effects.fully_damaged = true;
   store_.drop_damage();
-  flaw_thresholds_ = {};
+  flaw_codes_ = {};
 }
 
 template class HostEngine<MixedPrecision>;

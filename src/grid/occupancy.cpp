@@ -2,17 +2,20 @@
 
 #include <cstdlib>
 
+#include "breccia/error.hpp"
+
 namespace breccia::grid {
 
-Occupancy::Occupancy(std::span<const Placement> placements) : block_of_placement_(placements.size()) {
-  for (std::size_t i = 0; i < placements.size(); ++i) {
-    const Placement& p = placements[i];
-    const BlockKey key = block_key(block_of(p));
-    const std::uint32_t b = table_.insert(key);
-    if (b == blocks_.size()) blocks_.push_back({key, 0, {p.node[0], p.node[1], p.node[2]}});
-    ++blocks_[b].count;
-    block_of_placement_[i] = b;
+BlockCell Occupancy::add(const std::int32_t (&node)[3]) {
+  constexpr std::size_t kMostBlocks = std::size_t{1} << 26;
+  const BlockKey key = block_key({node[0] >> 2, node[1] >> 2, node[2] >> 2});
+  const std::uint32_t b = table_.insert(key);
+  if (b == blocks_.size()) {
+    if (b == kMostBlocks) throw NumericsError("particles in more than 67 million blocks of a rank: use more ranks");
+    blocks_.push_back({key, 0, {node[0], node[1], node[2]}});
   }
+  ++blocks_[b].count;
+  return {b, node[0] & 3, node[1] & 3, node[2] & 3};
 }
 
 void Occupancy::tell(const Occupant& occupant) {

@@ -24,15 +24,26 @@ struct Occupant {
   std::int32_t node[3];
 };
 
+/// Where a particle goes, in one word that lies in place of its node while particles are sorted: block and cell in it.
+struct BlockCell {
+  std::uint32_t block;  ///< index in Occupancy::blocks()
+  int x, y, z;          ///< cell, 0 to 3
+
+  [[nodiscard]] constexpr std::int32_t packed() const {
+    return static_cast<std::int32_t>(block << 6 | static_cast<std::uint32_t>(z << 4 | y << 2 | x));
+  }
+  static constexpr BlockCell of(std::int32_t packed) {
+    return {static_cast<std::uint32_t>(packed) >> 6, packed & 3, packed >> 2 & 3, packed >> 4 & 3};
+  }
+};
+
 /// The blocks that hold particles, in the order in which they were met.
 class Occupancy {
  public:
-  explicit Occupancy(std::span<const Placement> placements);
-
+  /// Counts a particle. Throws NumericsError beyond 67 million blocks.
+  BlockCell add(const std::int32_t (&node)[3]);
   /// The blocks of these particles; behind them those that other ranks told of.
   [[nodiscard]] const std::vector<Occupant>& blocks() const { return blocks_; }
-  /// Index of the block of each placement.
-  [[nodiscard]] const std::vector<std::uint32_t>& block_of_placement() const { return block_of_placement_; }
   /// A block of another rank.
   void tell(const Occupant& occupant);
   /// Whether the one particle of block `b` shares no node with another one, even after both have drifted one node.
@@ -55,7 +66,6 @@ class Occupancy {
 
   BlockTable table_;
   std::vector<Occupant> blocks_;
-  std::vector<std::uint32_t> block_of_placement_;
 };
 
 }  // namespace breccia::grid

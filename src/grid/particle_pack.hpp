@@ -115,22 +115,27 @@ BRECCIA_HD typename P::RealPack advance(const PassArguments<P>& a, Kinematics<P>
   return select(k.mass > T(Real(0)), largest, T(Real(0)));
 }
 
+/// Strain that activates the next flaw of each lane.
+template <class P>
+BRECCIA_HD typename P::RealPack next_threshold(const Flaws<P>& f) {
+  const auto code = reinterpret<std::int32_t>(reinterpret<std::uint32_t>(f.state) >> 16);
+  return convert<typename P::Real>(reinterpret<float>(material::threshold_bits(code)));
+}
+
 /// Activates the flaws whose threshold the strain has passed; a particle crosses few thresholds in its life, so this
 /// is scalar code behind one test of the pack.
 template <class P>
 BRECCIA_HD void activate_flaws(const PassArguments<P>& a, Flaws<P>& f, typename P::RealPack strain) {
   using Real = typename P::Real;
-  const auto passed = strain > f.next_threshold;
-  if (!any(passed)) return;
+  if (!any(strain > next_threshold(f))) return;
   for (int l = 0; l < P::kLanes; ++l) {
-    if (!(strain[l] > f.next_threshold[l])) continue;
-    const std::int32_t count = f.count[l];
-    const std::int32_t all = count >> 16;
-    std::int32_t active = count & 0xffff;
-    const float* threshold = a.flaw_thresholds + f.first[l];
-    while (active < all && strain[l] > static_cast<Real>(threshold[active])) ++active;
-    f.count.set(l, (all << 16) | active);
-    f.next_threshold.set(l, active < all ? static_cast<Real>(threshold[active]) : Real(1e30));
+    FlawState state = FlawState::of(f.state[l]);
+    const material::FlawCode* code = a.flaw_codes + f.first[l];
+    while (state.active < state.all && strain[l] > static_cast<Real>(material::threshold_of(state.next))) {
+      ++state.active;
+      state.next = state.active < state.all ? code[state.active] : material::kNeverGrows;
+    }
+    f.state.set(l, state.packed());
   }
 }
 
@@ -143,11 +148,12 @@ BRECCIA_HD void grow_damage(const PassArguments<P>& a, std::size_t i, typename P
   Flaws<P>& f = a.flaws[i];
   // Rounding must not hide a flaw that is just reached, hence the small share.
   const T bound = material::principal_strain_bound(s) * T(Real(1.0001));
-  if (any(bound > f.next_threshold)) activate_flaws(a, f, material::principal_strain(s));
-  const T active = convert<Real>(f.count & typename P::IntPack(0xffff));
+  if (any(bound > next_threshold(f))) activate_flaws(a, f, material::principal_strain(s));
+  using I = typename P::IntPack;
+  const T active = convert<Real>(f.state & I(255));
   const auto growing = (active > T(Real(0))) & (s.damage_root < T(Real(1)));
   if (!any(growing)) return;
-  const T all = convert<Real>(f.count >> 16);
+  const T all = convert<Real>((f.state >> 8) & I(255));
   // All lanes that grow have flaws and mass; the others must not divide by zero.
   const T rate = T(c.crack_growth) / breccia::cbrt(select(growing, mass, T(Real(1))));
   const T root = material::grow_damage_root(s.damage_root, active, select(growing, all, T(Real(1))), rate * T(a.step));

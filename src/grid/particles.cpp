@@ -104,15 +104,18 @@ class Stretch {
     }
   }
 
+  [[nodiscard]] std::size_t bytes() const { return (ring_.capacity() + behind_.capacity()) * sizeof(T); }
+
  private:
   std::size_t first_, last_;
   LargeArray<T> ring_;
   LargeArray<T> behind_;
 };
 
-// The packs of one group of fields, each slot s from source[s].
+// The packs of one group of fields, each slot s from source[s]. Returns the bytes held beside them meanwhile.
 template <class P, class T>
-void rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> source, Group group, Displacement d, int threads) {
+std::size_t rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> source, Group group, Displacement d,
+                      int threads) {
   std::vector<FieldDescriptor> table;
   for (const FieldDescriptor& field : fields<P>()) {
     if (field.group == group) table.push_back(field);
@@ -123,6 +126,7 @@ void rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> source, Grou
   if (most > packs.capacity()) packs.reserve(most + most / 16);
   packs.resize(most);
   const auto count = static_cast<std::size_t>(threads);
+  std::size_t beside = 0;
   if (count * (d.back + d.ahead + 1) > packs.size()) {
     // Particles that come from anywhere, of other ranks or without grid until now: a copy is less.
     const LargeArray<T> before(packs);
@@ -131,6 +135,7 @@ void rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> source, Grou
       gather_pack<P>(
           lanes_of<P>(source, p), table, [&](std::size_t q) { return &before[q]; }, packs[p]);
     }
+    beside = before.size() * sizeof(T);
   } else {
     std::vector<std::unique_ptr<Stretch<P, T>>> stretches(count);
 #pragma omp parallel for schedule(static, 1) num_threads(threads)
@@ -139,8 +144,10 @@ void rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> source, Grou
     }
 #pragma omp parallel for schedule(static, 1) num_threads(threads)
     for (std::size_t n = 0; n < count; ++n) stretches[n]->rearrange(packs, source, table);
+    for (const auto& stretch : stretches) beside += stretch->bytes();
   }
   packs.resize(after);
+  return beside;
 }
 
 template <class P>
@@ -166,10 +173,8 @@ std::vector<FieldDescriptor> make_fields() {
        accumulated},
       {"damage_root", "", "cube root of the damage", Group::kDamageLevel, 0, real, 1},
       {"total_strain", "", "F F^T - I of the total deformation", Group::kFlaws, offsetof(F, total), real, 6},
-      {"next_threshold", "", "strain that activates the next flaw", Group::kFlaws, offsetof(F, next_threshold), real,
-       1},
       {"flaw_first", "", "place of the flaws in the arena of this rank", Group::kFlaws, offsetof(F, first), 4, 1},
-      {"flaw_count", "", "active + 65536 * all", Group::kFlaws, offsetof(F, count), 4, 1},
+      {"flaw_state", "", "active + 256 * all + 65536 * code of the next", Group::kFlaws, offsetof(F, state), 4, 1},
       {"gravity", "m/s2", "acceleration held over the window", Group::kGravity, 0, real, 3},
       {"id_low", "", "global id, low half", Group::kIdentity, offsetof(I, id_low), 4, 1},
       {"id_high", "", "global id, high half", Group::kIdentity, offsetof(I, id_high), 4, 1},
@@ -288,9 +293,12 @@ std::size_t ParticleStore<P>::bytes_per_particle(const GroupSet& groups) {
 }
 
 template <class P>
-void ParticleStore<P>::gather(std::span<const std::uint32_t> source, int threads) {
+std::size_t ParticleStore<P>::gather(std::span<const std::uint32_t> source, int threads) {
   const Displacement d = displacement_of<P>(source);
-  for_each_group([&](Group group, auto& array) { rearrange<P>(array, source, group, d, threads); });
+  std::size_t beside = 0;
+  for_each_group(
+      [&](Group group, auto& array) { beside = std::max(beside, rearrange<P>(array, source, group, d, threads)); });
+  return beside;
 }
 
 template <class P>

@@ -10,6 +10,7 @@
 
 #include "breccia/huge_pages.hpp"
 #include "breccia/precision.hpp"
+#include "material/flaw_codes.hpp"
 
 namespace breccia::grid {
 
@@ -50,13 +51,27 @@ struct DamageLevel {
   typename P::RealPack root;
 };
 
+/// How many flaws grow, how many there are, and the code of the threshold that activates the next one, in one word.
+struct FlawState {
+  static constexpr std::int32_t kMostFlaws = 255;
+  std::int32_t active, all;
+  material::FlawCode next;  ///< kNeverGrows if all grow
+
+  [[nodiscard]] BRECCIA_HD std::int32_t packed() const {
+    return static_cast<std::int32_t>(std::uint32_t{next} << 16) | all << 8 | active;
+  }
+  BRECCIA_HD static FlawState of(std::int32_t packed) {
+    const auto next = static_cast<material::FlawCode>(static_cast<std::uint32_t>(packed) >> 16);
+    return {packed & 255, packed >> 8 & 255, next};
+  }
+};
+
 /// What damage growth needs while D < 1: total deformation F F^T - I and the flaws of the particle.
 template <class P>
 struct Flaws {
   typename P::RealPack total[6];
-  typename P::RealPack next_threshold;  ///< strain that activates the next flaw
-  typename P::IntPack first;            ///< place of the particle's thresholds in the rank's flaw arena
-  typename P::IntPack count;            ///< active + 65536 * all
+  typename P::IntPack first;  ///< place of the particle's codes in the rank's flaw arena
+  typename P::IntPack state;  ///< FlawState
 };
 
 /// Gravity held over a window [m/s2].
@@ -130,8 +145,8 @@ class ParticleStore {
 
   /// Rearranges: new slot s holds what old slot source[s] held; kEmpty makes an empty lane. source.size() is a multiple
   /// of the lanes. One group at a time. In place where no particle comes from far, so that the memory needed beside the
-  /// particles is that of the packs between old and new places; else with a copy of the group.
-  void gather(std::span<const std::uint32_t> source, int threads);
+  /// particles is that of the packs between old and new places; else with a copy of the group. Returns these bytes.
+  std::size_t gather(std::span<const std::uint32_t> source, int threads);
   static constexpr std::uint32_t kEmpty = 0xffffffffU;
 
   /// All fields of one slot as consecutive bytes, and back.

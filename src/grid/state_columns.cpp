@@ -8,7 +8,8 @@ namespace breccia::grid {
 
 bool saved_as_it_is(const FieldDescriptor& field) {
   const std::string name = field.name;
-  return name != "node" && name != "flaw_first" && name != "flaw_count" && name != "next_threshold";
+  if (field.group == Group::kFlaws) return name == "total_strain";
+  return name != "node";
 }
 
 StateColumn column_for(const FieldDescriptor& field, std::size_t particles) {

@@ -145,10 +145,10 @@ struct PassArguments {
   LonePacks lone;
   LonePull<P>* lone_pull = nullptr;  ///< one for each lone pack
 
-  const Real* velocities = nullptr;        ///< [blocks][64][8], VelocityChannel
-  Real* sums = nullptr;                    ///< [blocks][64][8], SumChannel
-  RowMask* rows = nullptr;                 ///< [blocks] rows that a scatter has added to
-  const float* flaw_thresholds = nullptr;  ///< arena of this rank
+  const Real* velocities = nullptr;                ///< [blocks][64][8], VelocityChannel
+  Real* sums = nullptr;                            ///< [blocks][64][8], SumChannel
+  RowMask* rows = nullptr;                         ///< [blocks] rows that a scatter has added to
+  const material::FlawCode* flaw_codes = nullptr;  ///< arena of this rank
   PassFault* fault = nullptr;
   const material::Constants<Real>* materials = nullptr;
   int material_count = 1;

@@ -9,6 +9,7 @@
 
 #include "breccia/error.hpp"
 #include "breccia/random.hpp"
+#include "material/flaw_codes.hpp"
 
 namespace breccia::material {
 namespace {
@@ -105,7 +106,7 @@ FlawLists draw_flaws(std::uint64_t particles_in_body, double body_volume, const 
   for (std::uint64_t j = 1; j <= flaws; ++j) {
     if (const auto row = place.find(random.below(j, particles_in_body))) {
       const double log_threshold = (std::log(static_cast<double>(j)) - log_flaw_scale) / damage.weibull_m;
-      lists.threshold[next[*row]++] = static_cast<float>(std::exp(log_threshold));
+      lists.threshold[next[*row]++] = threshold_of(flaw_code(static_cast<float>(std::exp(log_threshold))));
     }
   }
   return lists;

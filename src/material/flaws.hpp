@@ -12,17 +12,18 @@ namespace breccia::material {
 /// Flaw thresholds of a list of particles in compressed rows: particle i owns threshold[first[i]] .. [first[i+1] - 1].
 struct FlawLists {
   std::vector<std::uint32_t> first;  ///< n + 1 entries
-  std::vector<float> threshold;      ///< strains, ascending per particle
+  std::vector<float> threshold;      ///< strains, ascending per particle, as flaw_codes.hpp rounds them
 
   [[nodiscard]] std::span<const float> of(std::size_t i) const {
     return std::span<const float>(threshold).subspan(first[i], first[i + 1] - first[i]);
   }
 };
 
-/// Flaw j = 1, 2, ... has the threshold (j / (k V))^(1/m) and goes to a particle of the body drawn uniformly, until
-/// every particle has at least one. `body_volume` V [m3]. `wanted` lists distinct indices within the body, in any
-/// order; the rows of the result follow it. What a particle gets depends on seed, body and its index alone, so every
-/// rank draws the same flaws. Throws UsageError if an index is not below particles_in_body.
+/// Flaw j = 1, 2, ... has the threshold (j / (k V))^(1/m), rounded to 11 bits (flaw_codes.hpp), and goes to a particle
+/// of the body drawn uniformly, until every particle has at least one. `body_volume` V [m3]. `wanted` lists distinct
+/// indices within the body, in any order; the rows of the result follow it. What a particle gets depends on seed, body
+/// and its index alone, so every rank draws the same flaws. Throws UsageError if an index is not below
+/// particles_in_body.
 FlawLists draw_flaws(std::uint64_t particles_in_body, double body_volume, const DamageParameters& damage,
                      std::uint64_t seed, std::uint32_t body, std::span<const std::uint64_t> wanted);
 

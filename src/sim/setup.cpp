@@ -143,7 +143,7 @@ double bytes_per_particle(const Scene& scene, const ResolvedEffects& effects) {
       particles += n;
       flaws += n * (std::log(n) + 0.5772);  // expected draws until every particle has one
     }
-    bytes += flaws / particles * sizeof(float);
+    bytes += flaws / particles * sizeof(material::FlawCode);
   }
   // Sorting holds one group twice; the largest is the velocity gradient.
   return bytes + (mixed ? 36.0 : 72.0);

@@ -141,7 +141,7 @@ TYPED_TEST(Traffic, TableSaysWhatAStepReadsAndWrites) {
   const auto sums = step.sums();
   auto poisoned = before;
   const auto table = field_traffic<Real>();
-  const auto descriptors = grid::fields<TypeParam>();
+  const auto descriptors = device_fields<TypeParam>();
   ASSERT_EQ(table.size(), descriptors.size());
   for (std::size_t n = 0; n < table.size(); ++n) {
     ASSERT_EQ(table[n].name, descriptors[n].name);

@@ -57,6 +57,23 @@ class Particles : public testing::Test {
 using Precisions = testing::Types<MixedPrecision, DoublePrecision>;
 TYPED_TEST_SUITE(Particles, Precisions);
 
+// What a state of the flaws says comes back whole, the largest numbers included.
+TEST(FlawStates, SurviveTheirWord) {
+  for (const FlawState s : {FlawState{0, 1, 0}, FlawState{254, 255, 0xfffe}, FlawState{255, 255, 0xffff}}) {
+    const FlawState back = FlawState::of(s.packed());
+    EXPECT_EQ(back.active, s.active);
+    EXPECT_EQ(back.all, s.all);
+    EXPECT_EQ(back.next, s.next);
+  }
+}
+
+// At 8 per cell the nodes are 16 bytes a particle and 13 flaws 26 more: together at most 200 while damage grows.
+TEST(ParticleBytes, LeaveRoomForGridAndFlaws) {
+  GroupSet groups = kAllGroups;
+  groups.gravity = false;
+  EXPECT_LE(ParticleStore<MixedPrecision>::bytes_per_particle(groups), 156U);
+}
+
 // Particles of a plane change places with those of the next one, with gaps at the ends of tiles: more packs than
 // before.
 TYPED_TEST(Particles, NeighboursChangePlaces) {

@@ -9,6 +9,7 @@
 
 #include "breccia/constants.hpp"
 #include "breccia/error.hpp"
+#include "material/flaw_codes.hpp"
 
 namespace {
 
@@ -33,7 +34,8 @@ TEST(Flaws, EveryParticleHasAscendingFlaws) {
 }
 
 TEST(Flaws, FollowTheWeibullDistribution) {
-  // The thresholds are the quantiles themselves, so count(eps_j < eps) = k V eps^m to one flaw and float rounding.
+  // The thresholds are the quantiles themselves, so count(eps_j < eps) = k V eps^m to one flaw and the rounding of
+  // thresholds, half of 2^-11, which m = 9 magnifies: less than the 0.3 % that drawn thresholds would scatter.
   const DamageParameters basalt;
   const FlawLists flaws = draw_flaws(47324, kVolume, basalt, 1, 0, all(47324));
   std::vector<float> sorted = flaws.threshold;
@@ -41,7 +43,7 @@ TEST(Flaws, FollowTheWeibullDistribution) {
   for (const double strain : {3e-6, 5e-6, 8e-6, 1e-5}) {
     const auto count = double(std::lower_bound(sorted.begin(), sorted.end(), float(strain)) - sorted.begin());
     const double expected = basalt.weibull_k * kVolume * std::pow(strain, basalt.weibull_m);
-    EXPECT_NEAR(count, expected, 1.0 + 9.0 * 6e-8 * expected) << strain;
+    EXPECT_NEAR(count, expected, 1.0 + 9.0 * 0x1p-12 * expected) << strain;
   }
   EXPECT_NEAR(sorted.front(), 2.56e-6, 1e-8);
   // Which particles get them is random: in any half of the body the count has binomial scatter.
@@ -88,6 +90,27 @@ TEST(Flaws, HugeWeibullConstantsNeitherOverflowNorUnderflow) {
   const auto [low, high] = std::minmax_element(flaws.threshold.begin(), flaws.threshold.end());
   EXPECT_NEAR(*low, 1.9e-5, 0.1e-5);
   EXPECT_NEAR(*high, 4.2e-5, 0.2e-5);
+}
+
+TEST(FlawCodes, AreWithinHalfALastBitAndAscend) {
+  FlawCode last = 0;
+  for (double strain = 4e-9; strain < 15.9; strain *= 1.0001) {
+    const FlawCode code = flaw_code(static_cast<float>(strain));
+    ASSERT_GE(code, last) << strain;
+    last = code;
+    // Half of the last of 11 bits; the threshold is a float besides.
+    ASSERT_NEAR(threshold_of(code), strain, (0x1p-12 + 0x1p-24) * strain);
+    ASSERT_EQ(flaw_code(threshold_of(code)), code);
+  }
+}
+
+TEST(FlawCodes, OutOfRangeIsTheWeakestAndNever) {
+  EXPECT_EQ(threshold_of(flaw_code(1e-12F)), kWeakestFlaw);
+  EXPECT_EQ(threshold_of(flaw_code(0.0F)), kWeakestFlaw);
+  EXPECT_EQ(flaw_code(17.0F), kNeverGrows);
+  EXPECT_EQ(flaw_code(1e30F), kNeverGrows);
+  // No strain of a particle is that large.
+  EXPECT_EQ(threshold_of(kNeverGrows), 1e30F);
 }
 
 TEST(Flaws, RefuseAParticleOutsideTheBody) {
