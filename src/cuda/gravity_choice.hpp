@@ -27,12 +27,12 @@ inline constexpr DeviceRates kDeviceRates{.direct_pairs = 1.4e12,
                                           .tree_seconds = 7e-3,
                                           .box_seconds = 5e-4};
 template <>
-inline constexpr DeviceRates kDeviceRates<double>{.direct_pairs = 2.5e11,
+inline constexpr DeviceRates kDeviceRates<double>{.direct_pairs = 6e11,
                                                   .tree_pairs = 1e11,
                                                   .tree_bodies = 5e8,
                                                   .mesh_nodes = 2.5e9,
                                                   .host_bodies = 1.5e7,
-                                                  .tree_seconds = 7e-3,
+                                                  .tree_seconds = 1.2e-2,
                                                   .box_seconds = 5e-4};
 
 /// Seconds of an evaluation by each method.

@@ -297,14 +297,16 @@ __device__ __forceinline__ void add_particles(TileShared<Real>& shared, int part
   const StencilLane<Real> own(lane);
   for (int n = begin; n < end;) {
     const int start = shared.start[n];
+    int next = start;
     Real total[4] = {};
     do {
+      next = shared.start[n + 1 < end ? n + 1 : n];  // with the other loads: the loop waits once
       const Channels given(shared, n);
       const Real weight =
           own.weight[0](given.offset[0]) * own.weight[1](given.offset[1]) * own.weight[2](given.offset[2]);
       given.add(weight, own.step, total);
       ++n;
-    } while (n < end && shared.start[n] == start);
+    } while (n < end && next == start);
     const int at = start + own.node;
     for (int c = 0; c < Channels::kCount; ++c) shared.sums[part][Channels::kFirst + c][at] += total[c];
     if (Channels::kWithMass) shared.sums[part][kMass][at] += total[3];
