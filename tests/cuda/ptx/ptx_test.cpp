@@ -48,10 +48,11 @@ void expect_equal_to_host(const Scene& scene, int steps, const material::Runtime
   EXPECT_EQ(device->finish_damage(), host->finish_damage());
 }
 
-// In fewer than twenty steps there is so little strain that its rounding shows.
+// In fewer than twenty steps there is so little strain that its rounding shows; after twenty a flaw of one particle is
+// within the rounding of floats of its threshold.
 TEST_P(Ptx, CollisionEqualsHostEngine) {
   const Translated translated("production", arch());
-  expect_equal_to_host(small_impact(precision()), std::max(steps(40), 20));
+  expect_equal_to_host(small_impact(precision()), std::max(steps(40), 24));
 }
 
 TEST_P(Ptx, DebrisEqualsHostEngine) {
