@@ -36,11 +36,11 @@ Outcome run(const std::string& text, std::vector<std::string> overrides) {
 }
 
 // Sums of a node run in another order where slabs differ: ranks_test.cpp has the same bound, and its reason.
-void expect_same_physics(const std::string& text, const Scale& scale) {
-  const Outcome off = run(text, {"parallel.balance=off"});
+void expect_same_physics(const std::string& text, const Scale& scale, const std::string& window = "gravity.interval=8") {
+  const Outcome off = run(text, {window, "parallel.balance=off"});
   EXPECT_EQ(off.balance.recuts, 0U);
   for (const char* how : {"auto", "always"}) {
-    const Outcome other = run(text, {std::string("parallel.balance=") + how, "parallel.imbalance=1.01"});
+    const Outcome other = run(text, {window, std::string("parallel.balance=") + how, "parallel.imbalance=1.01"});
     ASSERT_EQ(other.states.size(), off.states.size());
     for (std::size_t n = 0; n < off.states.size(); ++n) expect_equal(other.states[n], off.states[n], scale);
     EXPECT_TRUE(std::strcmp(how, "auto") == 0 || other.balance.recuts == other.balance.windows);
@@ -48,7 +48,11 @@ void expect_same_physics(const std::string& text, const Scale& scale) {
 }
 
 TEST(Balance, SamePhysicsInACollision) {
-  expect_same_physics(collision(9e3) + "[gravity]\ninterval = 8\n", {200e3, 200.0});
+  expect_same_physics(collision(9e3), {200e3, 200.0});
+}
+// Cuts move where windows begin: with windows of one step, in every step.
+TEST(Balance, SamePhysicsCutAnewInEveryStep) {
+  expect_same_physics(long_flying_body(), {52e3, 2000.0}, "gravity.interval=1");
 }
 TEST(Balance, SamePhysicsOfAFlyingBody) { expect_same_physics(long_flying_body(), {52e3, 2000.0}); }
 
