@@ -36,7 +36,8 @@ Outcome run(const std::string& text, std::vector<std::string> overrides) {
 }
 
 // Sums of a node run in another order where slabs differ: ranks_test.cpp has the same bound, and its reason.
-void expect_same_physics(const std::string& text, const Scale& scale, const std::string& window = "gravity.interval=8") {
+void expect_same_physics(const std::string& text, const Scale& scale,
+                         const std::string& window = "gravity.interval=8") {
   const Outcome off = run(text, {window, "parallel.balance=off"});
   EXPECT_EQ(off.balance.recuts, 0U);
   for (const char* how : {"auto", "always"}) {
@@ -47,9 +48,7 @@ void expect_same_physics(const std::string& text, const Scale& scale, const std:
   }
 }
 
-TEST(Balance, SamePhysicsInACollision) {
-  expect_same_physics(collision(9e3), {200e3, 200.0});
-}
+TEST(Balance, SamePhysicsInACollision) { expect_same_physics(collision(9e3), {200e3, 200.0}); }
 // Cuts move where windows begin: with windows of one step, in every step.
 TEST(Balance, SamePhysicsCutAnewInEveryStep) {
   expect_same_physics(long_flying_body(), {52e3, 2000.0}, "gravity.interval=1");
