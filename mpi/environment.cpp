@@ -4,6 +4,7 @@
 #include <csignal>
 #include <cstdio>
 #include <cstring>
+#include <iostream>
 
 #include "mpi/comm.hpp"
 #include "mpi/ending.hpp"
@@ -32,6 +33,9 @@ Environment::Environment(int* argc, char*** argv) {
 }
 
 Environment::~Environment() {
+  // A rank that gives up ends at once: what it has printed must be out before.
+  std::fflush(nullptr);
+  std::cout.flush();
   const long long seconds = patience.count();
   std::snprintf(
       last_words, sizeof last_words,

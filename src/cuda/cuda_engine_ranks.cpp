@@ -95,7 +95,7 @@ void CudaEngine<P>::take(std::span<const unsigned> staying, std::vector<grid::Bl
       from += record;
       if (!particles_.groups().flaws) continue;
       std::byte* own = arrivals.data() + arrivals.size() - record;
-      const auto first = static_cast<std::int32_t>(flaw_thresholds_host_.size());
+      const std::int32_t first = material::flaw_place(flaw_thresholds_host_.size());
       std::int32_t count = 0;
       std::memcpy(&count, own + count_at, sizeof count);
       std::memcpy(own + first_at, &first, sizeof first);

@@ -129,9 +129,9 @@ void CudaEngine<P>::restore_flaws(const EngineState& state, const material::Flaw
   std::vector<Real> next(state.particles);
   for (std::size_t i = 0; i < first.size(); ++i) {
     const std::span<const float> own = flaws.of(i);
-    const auto all = static_cast<std::int32_t>(std::min<std::size_t>(own.size(), 0x7fff));
+    const auto all = static_cast<std::int32_t>(std::min<std::size_t>(own.size(), grid::FlawState::kMostFlaws));
     if (active[i] < 0 || active[i] > all) throw IoError("more flaws grow than the particle has");
-    first[i] = static_cast<std::int32_t>(flaws.first[i]);
+    first[i] = material::flaw_place(flaws.first[i]);
     count[i] = active[i] | all << 16;
     next[i] = active[i] < all ? static_cast<Real>(own[static_cast<std::size_t>(active[i])]) : Real(1e30);
   }

@@ -61,8 +61,6 @@ class DeviceParticles {
   void drop_damage();
 
  private:
-  void choose_fields();
-
   grid::GroupSet groups_;
   std::vector<Field> fields_;
   unsigned count_ = 0;

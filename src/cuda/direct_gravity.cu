@@ -14,12 +14,6 @@ __device__ __forceinline__ Vec3d position_of(const BodyArrays& bodies, unsigned 
 // neighbours.
 constexpr double kNarrow = 1024.0;
 
-template <class Real>
-struct DirectTile {
-  PairTile<Real> pairs;
-  Vec3<Real> rest[kTileSources];  ///< what rounding left of the sources' positions
-};
-
 /// What rounding leaves of a position.
 template <class Real>
 __device__ __forceinline__ Vec3<Real> rest_of(Vec3d x) {

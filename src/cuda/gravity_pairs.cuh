@@ -34,6 +34,13 @@ struct PairTile {
   PointMass<Real> source[kTileSources];
 };
 
+/// Of the direct sum.
+template <class Real>
+struct DirectTile {
+  PairTile<Real> pairs;
+  Vec3<Real> rest[kTileSources];  ///< what rounding left of the sources' positions
+};
+
 /// The square of a softening length [m2], enough of it that q^3 of a particle and itself stays finite.
 template <class Real>
 BRECCIA_HD Real squared_softening(double softening) {

@@ -31,18 +31,19 @@ long constitutive_operations() {
   return Counted::operations;
 }
 
-// By hand: 9 lines of 13, three planes of 7 and 6 at the end for each of 6 channels; 27 nodes of 14 + 6 * 8 + 2.
+// By hand: 9 lines of 13, three planes of 7 and 6 at the end for each of 6 channels; 27 nodes of 6 * 8 + 2 and
+// twice, for momentum and force, 17 of weights.
 constexpr long kGatherOperations = 6 * (9 * 13 + 3 * 7 + 6);
-constexpr long kScatterOperations = 27 * (14 + 6 * 8 + 2);
+constexpr long kScatterOperations = 27 * (2 * 17 + 6 * 8 + 2);
 
 template <class Real>
 void print(const char* name, long operations, const char* end) {
   std::printf(
-      "  {\"real\": \"%s\", \"tile_shared\": %zu, \"lone_shared\": %zu, \"pair_tile\": %zu, \"group_tiles\": %zu, "
+      "  {\"real\": \"%s\", \"tile_shared\": %zu, \"lone_shared\": %zu, \"direct_tile\": %zu, \"group_tiles\": %zu, "
       "\"near_lists\": %zu, "
       "\"threads\": %d, \"tile_bytes_particle\": %d,\n"
       "   \"tile_bytes_grid\": %.1f, \"node_bytes\": %.1f, \"operations\": %ld}%s\n",
-      name, sizeof(TileShared<Real>), kPassThreads * sizeof(ThreadWork), sizeof(PairTile<Real>),
+      name, sizeof(TileShared<Real>), kPassThreads * sizeof(ThreadWork), sizeof(DirectTile<Real>),
       sizeof(GroupShared<Real>), sizeof(NearShared<Real>), kPassThreads, particle_bytes<Real>(),
       (kVelocities * kTileNodes + kSums * kBox * kBox * kBox) * static_cast<double>(sizeof(Real)) /
           (kParticlesPerCell * grid::kBlockNodes),

@@ -407,8 +407,13 @@ __global__ void __launch_bounds__(kPassThreads, kPassBlocks<Real>) tile_pass(Pas
 
 template <class Real>
 void prepare_tile_pass() {
-  check(cudaFuncSetAttribute(&tile_pass<Real>, cudaFuncAttributeMaxDynamicSharedMemorySize, sizeof(TileShared<Real>)),
-        "shared memory of the tile pass");
+  if (cudaFuncSetAttribute(&tile_pass<Real>, cudaFuncAttributeMaxDynamicSharedMemorySize, sizeof(TileShared<Real>)) !=
+      cudaSuccess) {
+    (void)cudaGetLastError();
+    throw UsageError("this device has not the " + std::to_string(sizeof(TileShared<Real>)) +
+                     " bytes of shared memory that a tile takes in this precision: use --device host, or another "
+                     "numerics.precision or device");
+  }
 }
 
 template <class Real>

@@ -101,7 +101,7 @@ void HostEngine<P>::set_flaws(std::size_t slot, const material::FlawLists& flaws
   if (active > all) throw IoError("more flaws grow than the particle has");
   Flaws<P>& f = store_.flaws[slot / kLanes];
   const int lane = static_cast<int>(slot % kLanes);
-  f.first.set(lane, static_cast<std::int32_t>(flaws.first[row]));
+  f.first.set(lane, material::flaw_place(flaws.first[row]));
   const material::FlawCode next = active < all ? flaw_codes_[flaws.first[row] + active] : material::kNeverGrows;
   f.state.set(lane, FlawState{static_cast<std::int32_t>(active), static_cast<std::int32_t>(all), next}.packed());
 }

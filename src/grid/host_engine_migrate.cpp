@@ -39,7 +39,7 @@ void HostEngine<P>::take_records(const std::vector<std::vector<std::byte>>& mess
         set_destination(occupancy.add(node), slot);
         if (!store_.has(Group::kFlaws)) continue;
         store_.flaws[slot / kLanes].first.set(static_cast<int>(slot % kLanes),
-                                              static_cast<std::int32_t>(flaw_codes_.size()));
+                                              material::flaw_place(flaw_codes_.size()));
         const auto count = static_cast<std::size_t>(
             FlawState::of(store_.flaws[slot / kLanes].state[static_cast<int>(slot % kLanes)]).all);
         flaw_codes_.resize(flaw_codes_.size() + count);

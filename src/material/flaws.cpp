@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <string>
 
@@ -85,6 +86,13 @@ std::uint64_t draw_until_covered(std::uint64_t particles, const RandomStream& ra
 
 }  // namespace
 
+std::int32_t flaw_place(std::size_t place) {
+  if (place > std::numeric_limits<std::int32_t>::max()) {
+    throw NumericsError("a rank has more than 2^31 flaws, as some 1e8 particles have: use more ranks");
+  }
+  return static_cast<std::int32_t>(place);
+}
+
 FlawLists draw_flaws(std::uint64_t particles_in_body, double body_volume, const DamageParameters& damage,
                      std::uint64_t seed, std::uint32_t body, std::span<const std::uint64_t> wanted) {
   FlawLists lists;
@@ -97,7 +105,11 @@ FlawLists draw_flaws(std::uint64_t particles_in_body, double body_volume, const 
   const std::uint64_t flaws = draw_until_covered(particles_in_body, random, [&](std::uint64_t, std::uint64_t particle) {
     if (const auto row = place.find(particle)) ++lists.first[*row + 1];
   });
-  for (std::size_t i = 0; i < wanted.size(); ++i) lists.first[i + 1] += lists.first[i];
+  std::uint64_t sum = 0;
+  for (std::size_t i = 0; i < wanted.size(); ++i) {
+    sum += lists.first[i + 1];
+    lists.first[i + 1] = static_cast<std::uint32_t>(flaw_place(sum));
+  }
 
   lists.threshold.resize(lists.first.back());
   std::vector<std::uint32_t> next(lists.first.begin(), lists.first.end() - 1);

@@ -53,7 +53,7 @@ material::FlawLists draw_all_flaws(const Scene& scene, const Identities& particl
   for (std::size_t i = 0; i < count; ++i) {
     const std::span<const float> mine = drawn[particles.body[i]].of(row[i]);
     all.threshold.insert(all.threshold.end(), mine.begin(), mine.end());
-    all.first.push_back(static_cast<std::uint32_t>(all.threshold.size()));
+    all.first.push_back(static_cast<std::uint32_t>(material::flaw_place(all.threshold.size())));
   }
   return all;
 }

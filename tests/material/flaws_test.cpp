@@ -5,6 +5,8 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
+#include <limits>
 #include <numeric>
 
 #include "breccia/constants.hpp"
@@ -116,6 +118,13 @@ TEST(FlawCodes, OutOfRangeIsTheWeakestAndNever) {
 TEST(Flaws, RefuseAParticleOutsideTheBody) {
   const std::vector<std::uint64_t> outside{10};
   EXPECT_THROW(draw_flaws(10, kVolume, {}, 1, 0, outside), breccia::UsageError);
+}
+
+// Particles keep places in 32 bits with a sign.
+TEST(Flaws, PlacesBeyondTheirBitsAreRefused) {
+  constexpr std::size_t most = std::numeric_limits<std::int32_t>::max();
+  EXPECT_EQ(flaw_place(most), std::numeric_limits<std::int32_t>::max());
+  EXPECT_THROW(flaw_place(most + 1), breccia::NumericsError);
 }
 
 }  // namespace
