@@ -15,7 +15,7 @@ struct Plan {
   double time_step = 0.0;            ///< first step [s]
   std::string time_step_limited_by;  ///< "fixed by the scene", "acoustic with viscosity", "speed"
   std::uint64_t particles = 0;
-  double bytes_per_particle = 0.0;  ///< particle fields and sort buffer, without the grid
+  double bytes_per_particle = 0.0;  ///< its fields, without sorting and grid
 };
 
 /// Decides the effects and the first time step of a scene.

@@ -145,8 +145,7 @@ double bytes_per_particle(const Scene& scene, const ResolvedEffects& effects) {
     }
     bytes += flaws / particles * sizeof(material::FlawCode);
   }
-  // Sorting holds one group twice; the largest is the velocity gradient.
-  return bytes + (mixed ? 36.0 : 72.0);
+  return bytes;
 }
 
 double mean_spacing(const Scene& scene) {

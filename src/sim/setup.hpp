@@ -30,7 +30,7 @@ grid::EngineSetup engine_setup(const Scene& scene, const ResolvedEffects& effect
 /// Mean distance of the particles in all bodies as they are made [m]: a restarted run finds the same.
 double mean_spacing(const Scene& scene);
 
-/// Bytes of all fields of a particle, flaw thresholds (mean number) and sorting included, without the grid.
+/// Bytes of all fields of a particle, flaw thresholds (mean number) included, without sorting and grid.
 double bytes_per_particle(const Scene& scene, const ResolvedEffects& effects);
 
 }  // namespace breccia::sim
