@@ -209,22 +209,26 @@ TEST_F(CensusTest, BoxesOfScenesAreTheHosts) {
 
 // What comes to the host are blocks, not particles: no more of them where there is ten times the debris.
 TEST_F(CensusTest, DebrisStaysOnTheDevice) {
-  if (world_.size() > 1) return;
-  std::vector<std::size_t> listed;
+  const mpi::Comm alone = self();
+  std::vector<std::uint64_t> bytes, waits;
   for (const std::size_t debris : {300UL, 3000UL}) {
     std::mt19937_64 random(5);
     Cloud cloud;
     add_ball(cloud, 1500, {0, 0, 0}, 5e4, random);
     add_ball(cloud, debris, {0, 0, 0}, 1e9, random);
     OnDevice device(cloud);
-    device.census.divide(2e4);
-    std::vector<BlockIndex> dense;
-    for (const BlockCount& b : device.census.crowded(24)) dense.push_back(b.index);
-    listed.push_back(device.census.around(dense).size());
+    const std::uint64_t bytes_before = cuda_emulation::bytes_to_host();
+    const std::uint64_t waits_before = cuda_emulation::synchronisation_count();
+    EXPECT_EQ(gravity::lay_boxes(device.census, {.particle_spacing = 7e3}, alone).boxes.size(), 1U);
+    bytes.push_back(cuda_emulation::bytes_to_host() - bytes_before);
+    waits.push_back(cuda_emulation::synchronisation_count() - waits_before);
   }
-  EXPECT_GT(listed[0], 100U);
-  EXPECT_LT(listed[0], 400U) << "a ball five blocks wide, and what is next to it";
-  EXPECT_EQ(listed[1], listed[0]);
+  // A ball four blocks wide and what is next to it: up to 6^3 blocks of 72 bytes, 4^3 of 16.
+  EXPECT_GT(bytes[0], 4096U);
+  EXPECT_LT(bytes[0], 17'000U);
+  EXPECT_EQ(bytes[1], bytes[0]);
+  EXPECT_LE(waits[0], 9U);
+  EXPECT_EQ(waits[1], waits[0]);
 }
 
 INSTANTIATE_TEST_SUITE_P(Orders, CensusOrder, testing::Values(Order::kForward, Order::kReverse, Order::kRandom),
