@@ -1,7 +1,5 @@
 #include "bench/device_field.hpp"
 
-#include <cstring>
-
 #include "breccia/error.hpp"
 #include "grid/state_columns.hpp"
 #include "sim/setup.hpp"
@@ -39,14 +37,6 @@ ParticleArrays particles_of(const GravityState& state) {
   return particles;
 }
 
-template <class T>
-std::vector<T> column(const EngineState& state, const char* name, std::size_t components) {
-  const StateColumn& c = grid::find_column(state, name, sizeof(T), components);
-  std::vector<T> values(state.particles * components);
-  if (!values.empty()) std::memcpy(values.data(), c.values.data(), c.values.size());
-  return values;
-}
-
 }  // namespace
 
 DeviceField::DeviceField(const GravityState& state, Precision precision, const mpi::Comm& comm)
@@ -65,16 +55,10 @@ std::unique_ptr<gravity::ResidentSolver> DeviceField::make_solver(GravityMethod 
 
 std::vector<Vec3d> DeviceField::held() const {
   const EngineState state = engine_->save();
-  const auto id = column<std::int32_t>(state, "id_low", 1);
-  std::vector<Vec3d> a(state.particles);
-  const auto read = [&](auto zero) {
-    const auto values = column<decltype(zero)>(state, "gravity", 3);
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      const auto at = [&](std::size_t axis) { return static_cast<double>(values[3 * i + axis]); };
-      a[static_cast<std::size_t>(id[i])] = {at(0), at(1), at(2)};
-    }
-  };
-  precision_ == Precision::kDouble ? read(0.0) : read(0.0F);
+  const auto id = grid::column_values<std::int32_t>(state, "id_low", 1);
+  const std::vector<Vec3d> as_stored = grid::held_accelerations(state, precision_);
+  std::vector<Vec3d> a(as_stored.size());
+  for (std::size_t i = 0; i < a.size(); ++i) a[static_cast<std::size_t>(id[i])] = as_stored[i];
   return a;
 }
 

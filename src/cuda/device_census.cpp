@@ -67,12 +67,12 @@ unsigned DeviceCensus::count_found(const Launch& launch) {
 }
 
 std::vector<BlockCount> DeviceCensus::crowded(std::int64_t least) {
-  const auto list = [&](CountedBlock* to) {
-    return count_found(
-        [&](unsigned* found) { launch_list_crowded(table(), static_cast<unsigned>(least), found, to, stream_); });
+  const auto list = [&](unsigned* found, CountedBlock* to) {
+    launch_list_crowded(table(), static_cast<unsigned>(least), found, to, stream_);
   };
-  crowded_.reserve(list(nullptr));
-  list(crowded_.data());
+  crowded_.reserve(count_found([&](unsigned* found) { list(found, nullptr); }));
+  found_.fill_bytes(0, stream_);
+  list(found_.data(), crowded_.data());
   std::vector<BlockCount> blocks;
   for (const CountedBlock& b : crowded_.download(crowded_.size(), stream_)) {
     blocks.push_back({.index = b.index, .particles = b.count});

@@ -32,4 +32,7 @@ struct GravityLoad {
 template <class Real>
 std::uint64_t bytes_for_gravity(GravityMethod method, const GravityLoad& load);
 
+/// Of that, what DeviceCensus takes where boxes are sought [bytes].
+std::uint64_t bytes_for_census(const GravityLoad& load);
+
 }  // namespace breccia::cuda

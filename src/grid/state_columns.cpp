@@ -35,4 +35,17 @@ const StateColumn& find_column(const EngineState& state, const std::string& name
   return *found;
 }
 
+std::vector<Vec3d> held_accelerations(const EngineState& state, Precision precision) {
+  std::vector<Vec3d> a(state.particles);
+  const auto read = [&](auto zero) {
+    const auto values = column_values<decltype(zero)>(state, "gravity", 3);
+    for (std::size_t i = 0; i < a.size(); ++i) {
+      a[i] = {static_cast<double>(values[3 * i]), static_cast<double>(values[3 * i + 1]),
+              static_cast<double>(values[3 * i + 2])};
+    }
+  };
+  precision == Precision::kDouble ? read(0.0) : read(0.0F);
+  return a;
+}
+
 }  // namespace breccia::grid

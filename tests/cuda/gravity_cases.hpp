@@ -2,7 +2,6 @@
 #pragma once
 
 #include <cstdlib>
-#include <cstring>
 
 #include "gravity/resident.hpp"
 #include "grid/state_columns.hpp"
@@ -12,30 +11,13 @@ namespace breccia::cuda {
 
 using gravity::Parameters;
 
-// A column of a saved state.
-template <class T>
-std::vector<T> column(const EngineState& state, const char* field, std::size_t components) {
-  const StateColumn& c = grid::find_column(state, field, sizeof(T), components);
-  std::vector<T> values(state.particles * components);
-  if (!values.empty()) std::memcpy(values.data(), c.values.data(), c.values.size());
-  return values;
-}
-
 // The accelerations that the particles of this rank hold.
 inline std::vector<Vec3d> held(const Engine& engine, Precision precision) {
-  const EngineState state = engine.save();
-  std::vector<Vec3d> a(state.particles);
-  const auto read = [&](auto zero) {
-    const auto values = column<decltype(zero)>(state, "gravity", 3);
-    for (std::size_t i = 0; i < a.size(); ++i) {
-      a[i] = {static_cast<double>(values[3 * i]), static_cast<double>(values[3 * i + 1]),
-              static_cast<double>(values[3 * i + 2])};
-    }
-  };
-  precision == Precision::kDouble ? read(0.0) : read(0.0F);
-  return a;
+  return grid::held_accelerations(engine.save(), precision);
 }
-inline std::vector<std::int32_t> ids(const Engine& engine) { return column<std::int32_t>(engine.save(), "id_low", 1); }
+inline std::vector<std::int32_t> ids(const Engine& engine) {
+  return grid::column_values<std::int32_t>(engine.save(), "id_low", 1);
+}
 
 inline std::unique_ptr<Engine> loaded(const Scene& scene, const mpi::Comm& comm) {
   EngineSetup setup = setup_for(scene);

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "breccia/error.hpp"
+#include "gravity/mesh/block_pairs.hpp"
 #include "gravity/mesh/block_sieve.hpp"
 #include "gravity/mesh/box_mesh.hpp"
 #include "gravity/mesh/boxes.hpp"
@@ -269,6 +270,45 @@ TEST(Boxes, FollowTheDenseBodies) {
   cloud = spheres(500, {{0, 0, 0}}, 0.5 * radius);
   EXPECT_TRUE(boxes_of(cloud, spacing, self).empty());
   EXPECT_TRUE(boxes_of({}, spacing, self).empty());
+}
+
+// Each pair once, of lists that share some blocks and are a few blocks wide, negative coordinates included.
+TEST(Blocks, PairsThatTouchAreFound) {
+  std::mt19937_64 random(11);
+  std::uniform_int_distribution<std::int32_t> coordinate(-3, 3);
+  const auto draw = [&](std::size_t count) {
+    std::vector<BlockIndex> blocks(count);
+    for (BlockIndex& b : blocks) b = {coordinate(random), coordinate(random), coordinate(random)};
+    std::sort(blocks.begin(), blocks.end());
+    blocks.erase(std::unique(blocks.begin(), blocks.end()), blocks.end());
+    return blocks;
+  };
+  const std::vector<BlockIndex> some = draw(60);
+  const std::vector<BlockIndex> others = draw(150);
+  std::vector<int> found(some.size() * others.size(), 0);
+  for_each_touching(some, others, [&](std::size_t i, std::size_t j) { ++found[i * others.size() + j]; });
+  for (std::size_t i = 0; i < some.size(); ++i) {
+    for (std::size_t j = 0; j < others.size(); ++j) {
+      const BlockIndex a = some[i];
+      const BlockIndex b = others[j];
+      const bool touch = std::abs(a.x - b.x) <= 1 && std::abs(a.y - b.y) <= 1 && std::abs(a.z - b.z) <= 1;
+      EXPECT_EQ(found[i * others.size() + j], touch ? 1 : 0);
+    }
+  }
+}
+
+// Blocks that several ranks name count once: 700 particles are no body.
+TEST(Boxes, SharedBlocksCountOnce) {
+  const mpi::Comm comm;
+  const double spacing = 5e4 * std::cbrt(4.0 / 3.0 * kPi / 700.0);
+  const Cloud cloud = spheres(700, {{0, 0, 0}}, 5e4);
+  Cloud mine;
+  for (std::size_t i = 0; i < cloud.position.size(); ++i) {
+    if (static_cast<int>(i) % comm.size() != comm.rank()) continue;
+    mine.position.push_back(cloud.position[i]);
+    mine.mass.push_back(cloud.mass[i]);
+  }
+  EXPECT_TRUE(boxes_of(mine, spacing, comm).empty());
 }
 
 // Filled to just about what makes a block dense, with most of each on one rank: the others must count what it names.
