@@ -102,13 +102,14 @@ std::uint64_t common_bytes(const GravityLoad& load) {
 // those that some rank names for its share of a dense one's particles. Each stands for up to 26 around it, of which
 // seldom more than four hold particles and are nobody else's.
 std::uint64_t bytes_for_census(const GravityLoad& load) {
+  constexpr double in_block = 40.0;
   constexpr double least = 24.0;
   constexpr double least_named = 4.0;
   constexpr double most_blocks = 12'000;
   constexpr double contents = 5.0;
   const auto own = static_cast<double>(load.own);
   const auto slots = static_cast<double>(table_slots(load.own));
-  const double dense = std::min(static_cast<double>(load.all) / least, most_blocks);
+  const double dense = std::min(static_cast<double>(load.all) / in_block, most_blocks);
   const double named = dense * std::min(static_cast<double>(load.ranks), least / least_named);
   const double bytes = 3 * sizeof(unsigned) * slots + named * (sizeof(gravity::BlockIndex) + sizeof(unsigned)) +
                        std::min(own, named) * sizeof(CountedBlock) +

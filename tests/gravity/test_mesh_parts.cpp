@@ -297,11 +297,11 @@ TEST(Blocks, PairsThatTouchAreFound) {
   }
 }
 
-// Blocks that several ranks name count once: 700 particles are no body.
+// Blocks that several ranks name count once: 950 particles are no body.
 TEST(Boxes, SharedBlocksCountOnce) {
   const mpi::Comm comm;
-  const double spacing = 5e4 * std::cbrt(4.0 / 3.0 * kPi / 700.0);
-  const Cloud cloud = spheres(700, {{0, 0, 0}}, 5e4);
+  const double spacing = 5e4 * std::cbrt(4.0 / 3.0 * kPi / 950.0);
+  const Cloud cloud = spheres(950, {{0, 0, 0}}, 5e4);
   Cloud mine;
   for (std::size_t i = 0; i < cloud.position.size(); ++i) {
     if (static_cast<int>(i) % comm.size() != comm.rank()) continue;
