@@ -23,8 +23,8 @@ damage = )" +
 
 // Row 23. Danger: gravity held over a window but predicted for half a step too late or early makes a torque,
 // dL/dt = k s dt L with k = 7.5e-7: s = 15.5 windows of 0.61 s would spin the body up by 1.4 % in 2000 s. Guard:
-// prediction by (m - 1)/2 steps. The drift of L must not depend on the interval beyond 1e-4 per 2000 s; the transfer's
-// own exchange with the spin inside the cells is the same for all and taken off with m = 1.
+// prediction by (m - 1)/2 steps. L may drift by 1e-4 in 2000 s, the bound of physics.md 8, whatever the interval (the
+// transfer's own exchange with the spin inside the cells makes 3.4e-5 of it); half a step, 0.31 s, would be 4.6e-4.
 double spin_up(int interval) {
   const Scene scene = load(sphere("4e-4 rad/s", 0.0, 0.6103515625, interval),
                            {"numerics.precision=double", "effects.strength=false", "effects.damage=false"});
@@ -32,9 +32,7 @@ double spin_up(int interval) {
   return course.last.angular_momentum_z / course.first.angular_momentum_z - 1.0;
 }
 TEST(Quiet, GravityWindowsDoNotSpinUp) {
-  const double without_window = spin_up(1);
-  EXPECT_LT(std::abs(without_window), 1e-3);
-  for (const int interval : {8, 32}) EXPECT_NEAR(spin_up(interval), without_window, 1e-4) << interval;
+  for (const int interval : {1, 8, 32}) EXPECT_LT(std::abs(spin_up(interval)), 1e-4) << interval;
 }
 
 struct Shape {
