@@ -11,6 +11,10 @@ namespace breccia::io {
 /// The name a file has while it is written: in the same folder, so that renaming never copies.
 std::filesystem::path temporary_name(const std::filesystem::path& path);
 
+/// Removes a temporary file and the empty locks that MPI put beside it (NAME-JOB-PROCESS.lock), now or in a run that
+/// was killed. What cannot be removed stays.
+void discard_file(const std::filesystem::path& temporary);
+
 /// Flushes the finished file `temporary` to storage and gives it the name `path`, replacing what was there.
 /// Throws IoError.
 void commit_file(const std::filesystem::path& temporary, const std::filesystem::path& path);

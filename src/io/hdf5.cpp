@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "io/collectively.hpp"
+#include "io/durable_file.hpp"
 #include "io/hdf5_checks.hpp"
 
 namespace breccia::io::h5 {
@@ -87,8 +88,7 @@ void File::write_or_end(const std::string& object, const char* what, const std::
   try {
     body();
   } catch (const CallFailed& failure) {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
+    discard_file(path_);
     fmt::print(stderr, "error: {}\n", failure_text(object, what, failure.what()));
     MPI_Abort(comm_.handle(), static_cast<int>(ExitCode::kIo));
   }
