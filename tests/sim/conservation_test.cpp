@@ -38,7 +38,7 @@ class Conservation : public testing::TestWithParam<const char*> {};
 // radius, and only ever a loss.
 TEST_P(Conservation, OfACollisionWithEveryEffect) {
   constexpr double kCell = 12.5e3;
-  const Scene scene = load(collision(kCell), {std::string("numerics.precision=") + GetParam()});
+  const Scene scene = load(collision(kCell), {std::string("numerics.precision=") + GetParam(), "gravity.interval=64"});
   std::optional<Budget> budget;
   std::optional<Sums> start;
   io::DiagnosticsRow first;
