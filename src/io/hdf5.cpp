@@ -55,9 +55,9 @@ Handle parallel_access(const mpi::Comm& comm) {
   return access;
 }
 
-// Every rank for itself. Through MPI a file that is only read takes a lock, a new file beside it, and where that cannot be
-// written (a full disk) ranks wait for each other forever. HDF5's own lock is not needed either: no file is written that has
-// its final name.
+// Every rank for itself. Through MPI a file that is only read takes a lock, a new file beside it, and where that cannot
+// be written (a full disk) ranks wait for each other forever. HDF5's own lock is not needed either: no file is written
+// that has its final name.
 Handle access_of_a_reader() {
   Handle access = checked(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
 #if H5_VERSION_GE(1, 10, 7)
