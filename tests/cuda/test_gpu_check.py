@@ -35,6 +35,9 @@ class GpuCheck(unittest.TestCase):
         self.assertTrue(found["emulated"])
         self.assertEqual(found["tests"]["failed"], [])
         self.assertEqual(found["tests"]["passed"], 10)
+        self.assertTrue(found["messages"]["same"])
+        self.assertEqual(found["messages"]["nccl"]["way"], "NCCL 2.28.9")
+        self.assertIn("MPI", found["messages"]["mpi"]["way"])
         self.assertEqual({rate["precision"] for rate in found["rates"]}, {"mixed", "double"})
         for rate in found["rates"]:
             self.assertGreater(rate["device"], 0)
