@@ -97,8 +97,11 @@ void write_file(const std::filesystem::path& path, std::string_view content) {
 
 void reserve_space(const std::filesystem::path& path, std::uint64_t bytes) {
   const Descriptor file(path, O_RDWR, "open");
-  if (::fallocate(file.get(), 0, 0, static_cast<off_t>(bytes)) == 0) return;
-  int reason = errno;
+  int reason = 0;
+  do {
+    reason = ::fallocate(file.get(), 0, 0, static_cast<off_t>(bytes)) == 0 ? 0 : errno;
+  } while (reason == EINTR);
+  if (reason == 0) return;
   if (reason == EOPNOTSUPP) {
     std::error_code unknown;
     const std::filesystem::space_info space = std::filesystem::space(path, unknown);
@@ -107,6 +110,21 @@ void reserve_space(const std::filesystem::path& path, std::uint64_t bytes) {
   }
   throw IoError(fmt::format("{}: cannot reserve the {:.4g} MB it may need: {}", path.string(),
                             static_cast<double>(bytes) / 1e6, std::strerror(reason)));
+}
+
+void require_room_for_lock(const std::filesystem::path& temporary) {
+  const std::string block(4096, '\0');
+  std::filesystem::path lock = temporary;
+  lock += "-room.lock";
+  try {
+    Descriptor file(lock, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, "create");
+    write_all(file.get(), block, lock);
+    if (::fsync(file.get()) != 0 || file.close() != 0) fail(lock, "write");
+  } catch (const IoError&) {
+    ::unlink(lock.c_str());
+    throw;
+  }
+  ::unlink(lock.c_str());
 }
 
 }  // namespace breccia::io

@@ -27,4 +27,8 @@ void write_file(const std::filesystem::path& path, std::string_view content);
 /// Throws IoError if the space is not there.
 void reserve_space(const std::filesystem::path& path, std::uint64_t bytes);
 
+/// Throws IoError unless a small file can be made beside `temporary`, as MPI makes one to lock it: ranks that open a
+/// file together where it cannot wait for each other forever.
+void require_room_for_lock(const std::filesystem::path& temporary);
+
 }  // namespace breccia::io

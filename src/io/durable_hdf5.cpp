@@ -16,6 +16,7 @@ void write_durably(const std::filesystem::path& path, std::uint64_t bytes, const
       discard_file(temporary);
       write_file(temporary, "");
       reserve_space(temporary, bytes);
+      require_room_for_lock(temporary);
     });
     h5::File file = h5::File::create(temporary, comm);
     on_root(comm, [&] { reserve_space(temporary, bytes); });
