@@ -184,6 +184,17 @@ TEST_F(Nccl, FirstMessageMustComeAsItWasSent) {
                         [&] { NcclMessages(nccl::load(), sizeof(double), world_); });
 }
 
+// An exception on one rank does not wait for the others, who know nothing of it yet.
+TEST_F(Nccl, RankThatFailsLeavesAlone) {
+  const Variable patience("BRECCIA_NCCL_PATIENCE", "1");
+  expect_error<UsageError>("alone", [&] {
+    const NcclMessages messages(nccl::load(), sizeof(double), world_);
+    if (world_.rank() > 0) world_.barrier();
+    throw UsageError("alone");
+  });
+  if (world_.rank() == 0) world_.barrier();
+}
+
 TEST_F(Nccl, RanksMustAgreeOnWhatTheyShare) {
   NcclMessages messages(nccl::load(), sizeof(double), world_);
   std::vector<HaloPart> parts;
