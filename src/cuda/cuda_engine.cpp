@@ -208,7 +208,7 @@ template <class P>
 std::unique_ptr<gravity::ResidentSolver> CudaEngine<P>::make_resident_solver(GravityMethod method,
                                                                              const gravity::Parameters& parameters) {
   auto solver = std::make_unique<CudaGravity<Real>>(
-      method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_, setup_.threads);
+      method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_);
   solver->require_memory();
   return solver;
 }

@@ -42,6 +42,9 @@ class GpuCheck(unittest.TestCase):
         for rate in found["rates"]:
             self.assertGreater(rate["device"], 0)
             self.assertGreater(rate["host"], 0)
+        (gravity,) = found["gravity"]
+        self.assertEqual((gravity["chosen"], gravity["particles"]), ("direct", 1200))
+        self.assertLess(gravity["rms"], 1e-5)
         self.assertIn("emulated", process.stdout)
 
     def test_build_that_is_not_there(self):

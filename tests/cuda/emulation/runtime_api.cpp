@@ -80,6 +80,7 @@ Memory& memory() {
 std::uint64_t launches = 0;
 const Substitutes* substitutes = nullptr;
 std::uint64_t synchronisations = 0;
+std::uint64_t copied_to_host = 0;
 
 int device_of_this = 0;
 std::vector<EmulatedStream*> streams;
@@ -94,6 +95,7 @@ void enqueue(cudaStream_t stream, std::function<void()> work) { stream->enqueue(
 
 std::uint64_t launch_count() { return launches; }
 std::uint64_t synchronisation_count() { return synchronisations; }
+std::uint64_t bytes_to_host() { return copied_to_host; }
 std::size_t most_bytes() { return memory().most; }
 void forget_most_bytes() { memory().most = memory().used; }
 std::size_t used_bytes() { return memory().used; }
@@ -247,6 +249,7 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaM
   const bool from_device = kind != cudaMemcpyHostToDevice;
   if (memory().holds(to, bytes) != to_device || memory().holds(from, bytes) != from_device)
     return cudaErrorInvalidValue;
+  if (kind == cudaMemcpyDeviceToHost) breccia::cuda_emulation::copied_to_host += bytes;
   breccia::cuda_emulation::enqueue(stream, [=] { std::memcpy(to, from, bytes); });
   return cudaSuccess;
 }
