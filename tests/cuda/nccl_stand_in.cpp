@@ -5,6 +5,7 @@
 #include <mpi.h>
 
 #include <chrono>
+#include <cstdio>
 #include <cstdlib>
 #include <cstring>
 #include <functional>
@@ -160,7 +161,13 @@ NCCL_FUNCTION Result ncclCommInitRank(OpaqueComm** comm, int ranks, UniqueId id,
 }
 
 NCCL_FUNCTION Result ncclCommDestroy(OpaqueComm* comm) {
-  MPI_Barrier(comm->ranks->comm);
+  std::vector<MPI_Request> all_here(1);
+  std::vector<MPI_Status> states(1);
+  MPI_Ibarrier(comm->ranks->comm, all_here.data());
+  if (!all_done(all_here, states)) {
+    std::fputs("nccl_stand_in: a communicator is destroyed by some ranks only\n", stderr);
+    MPI_Abort(MPI_COMM_WORLD, 1);
+  }
   MPI_Comm_free(&comm->ranks->comm);
   comm->ranks->error = kInvalidUsage;  // for what is still in a stream
   delete comm;
