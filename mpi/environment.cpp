@@ -3,6 +3,7 @@
 
 #include <csignal>
 #include <cstdio>
+#include <cstdlib>
 #include <cstring>
 #include <iostream>
 
@@ -23,11 +24,19 @@ extern "C" void give_up(int) {
   _exit(1);
 }
 
+// Opening a file, Open MPI makes a shared file pointer that nobody here uses. Where all ranks are on one node, a
+// semaphore named after the file alone guards it (component sm): a process killed while it holds it leaves it taken,
+// and whoever writes a file of that name on that node afterwards waits forever; another user's cannot be opened at all.
+// Without that component it is a lock of a file, as it is between nodes, which ends with its process. What the user
+// says goes first.
+void avoid_named_semaphores() { setenv("OMPI_MCA_sharedfp", "^sm", 0); }
+
 }  // namespace
 
 void set_patience_at_end(std::chrono::seconds seconds) { patience = seconds; }
 
 Environment::Environment(int* argc, char*** argv) {
+  avoid_named_semaphores();
   int provided = 0;
   MPI_Init_thread(argc, argv, MPI_THREAD_FUNNELED, &provided);
 }

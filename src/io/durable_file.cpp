@@ -7,6 +7,7 @@
 #include <cerrno>
 #include <cstring>
 #include <string>
+#include <system_error>
 #include <utility>
 
 #include "breccia/error.hpp"
@@ -38,6 +39,10 @@ class Descriptor {
   int fd_;
 };
 
+std::filesystem::path folder_of(const std::filesystem::path& path) {
+  return path.has_parent_path() ? path.parent_path() : ".";
+}
+
 void write_all(int fd, std::string_view content, const std::filesystem::path& path) {
   while (!content.empty()) {
     const ssize_t written = ::write(fd, content.data(), content.size());
@@ -55,13 +60,24 @@ std::filesystem::path temporary_name(const std::filesystem::path& path) {
   return temporary;
 }
 
+void discard_file(const std::filesystem::path& temporary) {
+  std::error_code ignored;
+  std::filesystem::remove(temporary, ignored);
+  const std::string locks = temporary.filename().string() + "-";
+  std::filesystem::directory_iterator entry(folder_of(temporary), ignored);
+  for (; entry != std::filesystem::directory_iterator(); entry.increment(ignored)) {
+    const std::string name = entry->path().filename().string();
+    if (name.starts_with(locks) && name.ends_with(".lock")) std::filesystem::remove(entry->path(), ignored);
+  }
+}
+
 void commit_file(const std::filesystem::path& temporary, const std::filesystem::path& path) {
   Descriptor file(temporary, O_RDWR, "open");
   if (::fsync(file.get()) != 0) fail(temporary, "flush to storage");
   if (file.close() != 0) fail(temporary, "close");
   if (::rename(temporary.c_str(), path.c_str()) != 0) fail(path, "rename the finished file to this name");
   // The new name itself is data of the folder.
-  const std::filesystem::path folder = path.has_parent_path() ? path.parent_path() : ".";
+  const std::filesystem::path folder = folder_of(path);
   const Descriptor directory(folder, O_RDONLY | O_DIRECTORY, "open");
   if (::fsync(directory.get()) != 0 && errno != EINVAL) fail(folder, "flush to storage");
 }
@@ -81,8 +97,11 @@ void write_file(const std::filesystem::path& path, std::string_view content) {
 
 void reserve_space(const std::filesystem::path& path, std::uint64_t bytes) {
   const Descriptor file(path, O_RDWR, "open");
-  if (::fallocate(file.get(), 0, 0, static_cast<off_t>(bytes)) == 0) return;
-  int reason = errno;
+  int reason = 0;
+  do {
+    reason = ::fallocate(file.get(), 0, 0, static_cast<off_t>(bytes)) == 0 ? 0 : errno;
+  } while (reason == EINTR);
+  if (reason == 0) return;
   if (reason == EOPNOTSUPP) {
     std::error_code unknown;
     const std::filesystem::space_info space = std::filesystem::space(path, unknown);
@@ -91,6 +110,21 @@ void reserve_space(const std::filesystem::path& path, std::uint64_t bytes) {
   }
   throw IoError(fmt::format("{}: cannot reserve the {:.4g} MB it may need: {}", path.string(),
                             static_cast<double>(bytes) / 1e6, std::strerror(reason)));
+}
+
+void require_room_for_lock(const std::filesystem::path& temporary) {
+  const std::string block(4096, '\0');
+  std::filesystem::path lock = temporary;
+  lock += "-room.lock";
+  try {
+    Descriptor file(lock, O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, "create");
+    write_all(file.get(), block, lock);
+    if (::fsync(file.get()) != 0 || file.close() != 0) fail(lock, "write");
+  } catch (const IoError&) {
+    ::unlink(lock.c_str());
+    throw;
+  }
+  ::unlink(lock.c_str());
 }
 
 }  // namespace breccia::io

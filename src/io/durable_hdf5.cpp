@@ -1,7 +1,5 @@
 #include "io/durable_hdf5.hpp"
 
-#include <system_error>
-
 #include "breccia/error.hpp"
 #include "io/collectively.hpp"
 #include "io/durable_file.hpp"
@@ -15,8 +13,10 @@ void write_durably(const std::filesystem::path& path, std::uint64_t bytes, const
   try {
     // Twice: before HDF5 has a file open that could not be closed on a full disk, and after it emptied the file.
     on_root(comm, [&] {
+      discard_file(temporary);
       write_file(temporary, "");
       reserve_space(temporary, bytes);
+      require_room_for_lock(temporary);
     });
     h5::File file = h5::File::create(temporary, comm);
     on_root(comm, [&] { reserve_space(temporary, bytes); });
@@ -25,10 +25,7 @@ void write_durably(const std::filesystem::path& path, std::uint64_t bytes, const
     if (finish) finish(temporary);
     on_root(comm, [&] { commit_file(temporary, path); });
   } catch (const Error&) {
-    if (comm.is_root()) {
-      std::error_code ignored;
-      std::filesystem::remove(temporary, ignored);
-    }
+    if (comm.is_root()) discard_file(temporary);
     throw;
   }
 }

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include "io/collectively.hpp"
+#include "io/durable_file.hpp"
 #include "io/hdf5_checks.hpp"
 
 namespace breccia::io::h5 {
@@ -54,6 +55,17 @@ Handle parallel_access(const mpi::Comm& comm) {
   return access;
 }
 
+// Every rank for itself. Through MPI a file that is only read takes a lock, a new file beside it, and where that cannot
+// be written (a full disk) ranks wait for each other forever. HDF5's own lock is not needed either: no file is written
+// that has its final name.
+Handle access_of_a_reader() {
+  Handle access = checked(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
+#if H5_VERSION_GE(1, 10, 7)
+  check(H5Pset_file_locking(access.get(), false, true));
+#endif
+  return access;
+}
+
 }  // namespace
 
 CallFailed::CallFailed() {
@@ -87,8 +99,7 @@ void File::write_or_end(const std::string& object, const char* what, const std::
   try {
     body();
   } catch (const CallFailed& failure) {
-    std::error_code ignored;
-    std::filesystem::remove(path_, ignored);
+    discard_file(path_);
     fmt::print(stderr, "error: {}\n", failure_text(object, what, failure.what()));
     MPI_Abort(comm_.handle(), static_cast<int>(ExitCode::kIo));
   }
@@ -106,7 +117,7 @@ File File::create(const std::filesystem::path& path, const mpi::Comm& comm) {
 File File::open(const std::filesystem::path& path, const mpi::Comm& comm) {
   File file(path, comm);
   file.stage("", "open as an HDF5 file", [&] {
-    const Handle access = parallel_access(comm);
+    const Handle access = access_of_a_reader();
     file.file_ = checked(H5Fopen(path.c_str(), H5F_ACC_RDONLY, access.get()), H5Fclose);
   });
   return file;

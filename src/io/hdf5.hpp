@@ -75,7 +75,7 @@ class File {
  public:
   /// A new file, replacing an old one of this name.
   static File create(const std::filesystem::path& path, const mpi::Comm& comm);
-  /// An existing file, to be read.
+  /// An existing file, to be read: by each rank for itself, without MPI.
   static File open(const std::filesystem::path& path, const mpi::Comm& comm);
 
   /// Flushes all ranks' data to storage and closes.

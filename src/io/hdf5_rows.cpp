@@ -79,7 +79,7 @@ void File::read_rows_of(const std::string& dataset, Rows rows, std::uint64_t com
     const Handle space = checked(H5Dget_space(set.get()), H5Sclose);
     if (H5Sget_simple_extent_npoints(space.get()) == 0) return;
     const Handle memory_space = select_rows(space, rank_of(components), rows, components);
-    check(H5Dread(set.get(), type, memory_space.get(), space.get(), collective_transfer().get(), values));
+    check(H5Dread(set.get(), type, memory_space.get(), space.get(), H5P_DEFAULT, values));
   });
 }
 
@@ -107,7 +107,7 @@ std::string File::read_text(const std::string& dataset) const {
     const Handle set = checked(H5Dopen2(file_.get(), dataset.c_str(), H5P_DEFAULT), H5Dclose);
     const Handle type = checked(H5Dget_type(set.get()), H5Tclose);
     text.resize(H5Tget_size(type.get()));
-    check(H5Dread(set.get(), type.get(), H5S_ALL, H5S_ALL, collective_transfer().get(), text.data()));
+    check(H5Dread(set.get(), type.get(), H5S_ALL, H5S_ALL, H5P_DEFAULT, text.data()));
   });
   text.resize(text.find_last_not_of('\0') + 1);
   return text;

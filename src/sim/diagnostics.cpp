@@ -3,12 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <vector>
 
 #include "breccia/error.hpp"
 #include "grid/setup_choices.hpp"
+#include "sim/compensated_sums.hpp"
 
 namespace breccia::sim {
 namespace {
@@ -72,7 +72,7 @@ std::vector<double> Budget::potential(const ParticleOutput& p) const {
 }
 
 io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput& p, const LostWork& lost) {
-  std::array<double, kSums> s{};
+  CompensatedSums<kSums> s;
   double max_speed = 0.0;
   for (std::size_t i = 0; i < p.size(); ++i) {
     const Vec3d momentum = p.mass[i] * p.velocity[i];
@@ -80,32 +80,32 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
     const Vec3d spin{c.zy - c.yz, c.xz - c.zx, c.yx - c.xy};
     const Vec3d angular = cross(p.position[i], momentum) + (p.mass[i] * affine_moment_) * spin;
     const double speed = length(p.velocity[i]);
-    s[kMass] += p.mass[i];
-    s[kPx] += momentum.x;
-    s[kPy] += momentum.y;
-    s[kPz] += momentum.z;
-    s[kLx] += angular.x;
-    s[kLy] += angular.y;
-    s[kLz] += angular.z;
-    s[kKinetic] += 0.5 * p.mass[i] * speed * speed;
-    s[kAffine] += 0.5 * p.mass[i] * affine_moment_ * squared_norm(c);
-    if (!p.internal_energy.empty()) s[kInternal] += p.mass[i] * p.internal_energy[i];
-    s[kGravity] -= p.mass[i] * dot(uniform_gravity_, p.position[i]);
-    s[kDamaged] += p.mass[i] * p.damage[i];
-    s[kMomentumScale] += p.mass[i] * speed;
-    s[kAngularScale] += length(angular);
+    s.add(kMass, p.mass[i]);
+    s.add(kPx, momentum.x);
+    s.add(kPy, momentum.y);
+    s.add(kPz, momentum.z);
+    s.add(kLx, angular.x);
+    s.add(kLy, angular.y);
+    s.add(kLz, angular.z);
+    s.add(kKinetic, 0.5 * p.mass[i] * speed * speed);
+    s.add(kAffine, 0.5 * p.mass[i] * affine_moment_ * squared_norm(c));
+    if (!p.internal_energy.empty()) s.add(kInternal, p.mass[i] * p.internal_energy[i]);
+    s.add(kGravity, -(p.mass[i] * dot(uniform_gravity_, p.position[i])));
+    s.add(kDamaged, p.mass[i] * p.damage[i]);
+    s.add(kMomentumScale, p.mass[i] * speed);
+    s.add(kAngularScale, length(angular));
     max_speed = std::max(max_speed, speed);
   }
   const std::vector<double> self_gravity = potential(p);
-  for (std::size_t i = 0; i < self_gravity.size(); ++i) s[kGravity] += 0.5 * p.mass[i] * self_gravity[i];
-  s[kGravity] -= lost.periods + engine.work_beyond_period();
-  s[kElastic] = engine.elastic_energy();
-  s[kPlastic] = lost.plastic;
-  s[kViscous] = lost.viscous;
-  s[kClamped] = static_cast<double>(lost.clamped);
-  s[kParticles] = static_cast<double>(p.size());
-  s[kBlocks] = static_cast<double>(engine.stats().blocks);
-  comm_.sum(std::span<double>(s));
+  for (std::size_t i = 0; i < self_gravity.size(); ++i) s.add(kGravity, 0.5 * p.mass[i] * self_gravity[i]);
+  s.add(kGravity, -(lost.periods + engine.work_beyond_period()));
+  s.add(kElastic, engine.elastic_energy());
+  s.add(kPlastic, lost.plastic);
+  s.add(kViscous, lost.viscous);
+  s.add(kClamped, static_cast<double>(lost.clamped));
+  s.add(kParticles, static_cast<double>(p.size()));
+  s.add(kBlocks, static_cast<double>(engine.stats().blocks));
+  comm_.sum(std::span<double>(s.parts()));
 
   const std::vector<double> ratios = engine.volume_ratios();
   const auto [low, high] = std::minmax_element(ratios.begin(), ratios.end());

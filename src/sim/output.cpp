@@ -103,7 +103,10 @@ void Output::write_snapshot(const TimeLoop& loop, const ParticleOutput& particle
   header.target_mass = target_mass(scene_);
   header.scene_name = scene_.name;
   const std::string name = io::snapshot_name(snapshot_number_++);
+  const auto start = std::chrono::steady_clock::now();
   io::write_snapshot(folder_ / name, header, particles, scene_.output.fields, comm_);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  longest_write_ = std::max(longest_write_, seconds);
   io::add_to_series(folder_, name, loop.time(), comm_);
 }
 

@@ -1,8 +1,10 @@
 """Disks, folders and files that fail: clear errors with exit code 4, and nothing harmed that was there before."""
 
+import contextlib
 import hashlib
 import os
 import resource
+import shutil
 import signal
 import subprocess
 import time
@@ -39,7 +41,9 @@ class IoFaults(CommandTest):
         folder = self.folder / "mount"
         folder.mkdir()
         if os.geteuid() != 0 or subprocess.run(
-            ["mount", "-t", "tmpfs", "-o", f"size={size}", "none", folder], capture_output=True, check=False
+            ["mount", "-t", "tmpfs", "-o", ",".join((f"size={size}", *options)), "none", folder],
+            capture_output=True,
+            check=False,
         ).returncode:
             self.skipTest("no file system can be mounted here")
         self.addCleanup(subprocess.run, ["umount", "-l", folder], check=False)
@@ -74,6 +78,29 @@ class IoFaults(CommandTest):
                     self.assertEqual(
                         (out / "run.hdf.series").read_text(), (whole / "run.hdf.series").read_text()
                     )
+
+    def test_full_disk_can_be_read(self):
+        disk = self.mount("8m")
+        self.assertEqual(self.run_scene("--steps", 30, out=disk / "out").returncode, 0)
+        with open(disk / "ballast", "wb") as file, contextlib.suppress(OSError):
+            while True:
+                os.write(file.fileno(), bytes(4096))
+        before = sorted(os.listdir(disk / "out"))
+        newest = sorted((disk / "out").glob("checkpoint_*"))[-1]
+        for ranks in (1, 2):
+            with self.subTest(ranks=ranks):
+                process = self.run_scene("--restart", newest, "--steps", 40, out=self.folder / f"on{ranks}", ranks=ranks)
+                self.assertEqual(process.returncode, 0, process.stderr)
+        self.assertEqual(sorted(os.listdir(disk / "out")), before)
+
+    def test_no_room_for_a_lock(self):
+        """Files enough for the folders, the table and the first snapshot, but not for the lock that MPI puts beside it."""
+        disk = self.mount("8m", "nr_inodes=4")
+        for ranks in (1, 2):
+            with self.subTest(ranks=ranks):
+                process = self.run_scene("--steps", 30, out=disk / "out", ranks=ranks)
+                self.assert_fails(process, 4, "snap_0000.hdf", "No space left")
+                shutil.rmtree(disk / "out")
 
     def test_files_may_not_grow(self):
         """ulimit -f, as some machines have it; set once MPI has its own files, which are larger than ours."""

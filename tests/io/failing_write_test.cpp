@@ -1,6 +1,9 @@
 // What a run sees when the disk lets it down: the same IoError on every rank, no rank left waiting, no half file.
+#include <fcntl.h>
 #include <gtest/gtest.h>
+#include <semaphore.h>
 #include <sys/resource.h>
+#include <unistd.h>
 
 #include <csignal>
 #include <fstream>
@@ -108,6 +111,26 @@ TEST(FailingWrite, DiagnosticsOnAFullDisk) {
   comm.barrier();
   const Error error = error_of([&] { const DiagnosticsWriter writer(path, comm); });
   expect_same_error_everywhere(error, ExitCode::kIo, "diagnostics.csv: cannot write: No space left", comm);
+}
+
+// What a process leaves that was killed while Open MPI opened a file of the same name: a semaphore that is taken, or a
+// lock of a file.
+TEST(FailingWrite, LeftoversOfAKilledProcessDoNotStopTheNext) {
+  constexpr const char* kSemaphore = "/OMPIO_after_kill.hdf.part";
+  constexpr unsigned kFarTooLong = 30;  // [s] 10 particles take a hundredth of a second
+  const mpi::Comm comm;
+  const test::ScratchFolder folder("after_kill", comm);
+  if (comm.is_root()) {
+    ASSERT_NE(sem_open(kSemaphore, O_CREAT, 0644, 0), SEM_FAILED);
+    std::ofstream(folder.path() / "after_kill.hdf.part-1234-56.lock");
+  }
+  comm.barrier();
+  alarm(kFarTooLong);
+  write_snapshot(folder.path() / "after_kill.hdf", {}, test::scattered_particles(10, comm), {}, comm);
+  alarm(0);
+  comm.barrier();
+  if (comm.is_root()) sem_unlink(kSemaphore);
+  EXPECT_EQ(test::names_in(folder.path()), std::vector<std::string>{"after_kill.hdf"});
 }
 
 TEST(FailingWrite, FolderWithContentIsRefused) {

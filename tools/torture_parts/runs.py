@@ -47,6 +47,7 @@ class Runner:
         self.breccia = root / "build" / "release" / "breccia"
         self.folder = folder
         self.ranks = ranks
+        self.stuck_launchers = 0  # mpirun that did not end after all its ranks had
         self.scene = folder / "scene.toml"
         folder.mkdir(parents=True, exist_ok=True)
         self.scene.write_text(SCENE)
@@ -86,7 +87,9 @@ def end(process):
 
 
 def ranks_of(process):
-    """Process ids of the ranks: the children of mpirun, or the run itself."""
+    """Process ids of the ranks that live: the children of mpirun, or the run itself."""
+    if process.args[0] != "mpirun":
+        return [] if process.poll() is not None else [process.pid]
     try:
         children = Path(f"/proc/{process.pid}/task/{process.pid}/children").read_text().split()
     except (FileNotFoundError, ProcessLookupError):
@@ -94,7 +97,8 @@ def ranks_of(process):
     ranks = []
     for pid in map(int, children):
         try:
-            if Path(f"/proc/{pid}/comm").read_text().strip() == "breccia":
+            name, _, state = Path(f"/proc/{pid}/stat").read_text().partition("(")[2].rpartition(")")
+            if name == "breccia" and state.split()[0] != "Z":
                 ranks.append(pid)
         except (FileNotFoundError, ProcessLookupError):
             pass
