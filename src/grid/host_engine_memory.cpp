@@ -1,7 +1,7 @@
-// What the engine holds when. Where nodes are few beside particles, each of the large arrays exists only while
-// something in it is needed: sums from a scatter to the grid update that ends them, velocities from there to the
-// gather, velocity gradients from the half step before a sorting to the one after it. That is the least at the sorting,
-// where particles are rearranged. Where nodes are many, to clear them anew would cost more than it gives.
+// What the engine holds when. Where nodes are few beside particles, the memory of an array is given back around a
+// sorting while nobody needs it: that of the sums before the half step that only gathers, of the nodes' velocities from
+// the sorting to the next grid update, of the velocity gradients after the half step that only scatters. Where nodes
+// are many, to clear them anew would cost more than it gives.
 #include <algorithm>
 
 #include "grid/host_engine.hpp"
