@@ -63,4 +63,10 @@ class HugePageAllocator {
 template <class T>
 using LargeArray = std::vector<T, HugePageAllocator<T>>;
 
+/// Gives the memory of a vector back, which keeps all of it where {} is assigned.
+template <class Vector>
+void release(Vector& vector) {
+  Vector().swap(vector);
+}
+
 }  // namespace breccia

@@ -55,6 +55,7 @@ Measured measure(const Row& row, Precision precision, int threads, double second
   scene.numerics.reproducible = row.reproducible;
   const auto engine =
       sim::make_loaded_engine(scene, sim::resolve_effects(scene), make_state(c, scene, comm), threads, comm, make);
+  engine->finish_damage();  // where all rock is broken from the start
   const double dt = *scene.time.step;
   const int interval = scene.numerics.sort_interval;
   engine->scatter(0.5 * dt);

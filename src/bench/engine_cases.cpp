@@ -1,5 +1,6 @@
 #include "bench/engine_cases.hpp"
 
+#include <algorithm>
 #include <cmath>
 
 #include "breccia/constants.hpp"
@@ -11,8 +12,9 @@ namespace breccia::bench {
 namespace {
 
 constexpr EngineCase kCases[] = {
-    {"paper", 47324, 1.412, 0.0},  {"debris", 47324, 1.412, 0.25},  {"cell8_1e5", 50000, 8.0, 0.0},
-    {"cell8_1e4", 5000, 8.0, 0.0}, {"cell8_1e6", 500000, 8.0, 0.0}, {"cell8_1e7", 5000000, 8.0, 0.0},
+    {"paper", 47324, 1.412, 0.0},           {"debris", 47324, 1.412, 0.25},  {"cell8_1e5", 50000, 8.0, 0.0},
+    {"cell8_1e4", 5000, 8.0, 0.0},          {"cell8_1e6", 500000, 8.0, 0.0}, {"cell8_1e7", 5000000, 8.0, 0.0},
+    {"broken_1e6", 500000, 8.0, 0.0, true},
 };
 
 constexpr EffectChoice kEffects[] = {
@@ -57,6 +59,7 @@ Scene make_scene(const EngineCase& c, const EffectChoice& effects, Precision pre
 
 ParticleArrays make_state(const EngineCase& c, const Scene& scene, const mpi::Comm& comm) {
   ParticleArrays particles = scene::make_particles(scene, comm);
+  if (c.broken) std::fill(particles.damage.begin(), particles.damage.end(), 1.0);
   if (c.debris_share == 0.0) return particles;
   const auto stride = static_cast<std::size_t>(std::lround(1.0 / c.debris_share));
   const RandomStream random(1, 0);

@@ -17,12 +17,13 @@ struct EngineCase {
   std::uint64_t particles_each;
   double particles_per_cell;
   double debris_share;  ///< of all particles, alone and anywhere out to kDebrisRadius
+  bool broken = false;  ///< D = 1 everywhere
 };
 
 inline constexpr double kDebrisRadius = 2.0e7;  ///< [m]
 
-/// paper: the paper's baseline. cell8_1e6: well filled cells. debris: after an impact. cell8_1e4, cell8_1e5 and
-/// cell8_1e7: whether the cost of a particle depends on their number.
+/// paper: the paper's baseline. cell8_1e6: well filled cells; broken_1e6: the same with D = 1 everywhere. debris: after
+/// an impact. cell8_1e4, cell8_1e5 and cell8_1e7: whether the cost of a particle depends on their number.
 std::span<const EngineCase> engine_cases();
 
 /// The effects of a measurement: all of them, or all but one.

@@ -3,6 +3,7 @@
 #include <cmath>
 
 #include "breccia/error.hpp"
+#include "breccia/huge_pages.hpp"
 #include "grid/setup_choices.hpp"
 
 namespace breccia::cuda {
@@ -235,7 +236,7 @@ void CudaEngine<P>::switch_damage_off() {
   setup_.effects.fully_damaged = true;
   particles_.drop_damage();
   flaw_thresholds_ = {};
-  flaw_thresholds_host_ = {};
+  release(flaw_thresholds_host_);
 }
 
 template class CudaEngine<MixedPrecision>;

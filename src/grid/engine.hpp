@@ -89,7 +89,7 @@ struct EngineStats {
   double halo_waited = 0.0;         ///< of that, with nothing else to do [s]
   std::uint64_t particle_bytes = 0;
   std::uint64_t grid_bytes = 0;
-  std::uint64_t sort_bytes = 0;  ///< that the last sorting needed beyond these; 0 on a device
+  std::uint64_t sort_bytes = 0;  ///< more than these, held at once around the last sorting; 0 on a device
 };
 
 class Engine {

@@ -74,16 +74,23 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
 
 template <class P>
 void HostEngine<P>::scatter(double half_step) {
+  hold_sums();
   PassArguments<P> a = pass_arguments(0.0, half_step);
   a.gather = false;
   run_pass(a);
+  count_bytes(0);
+  drop_gradients();
 }
 
 template <class P>
 void HostEngine<P>::gather(double step) {
+  drop_sums();
+  store_.hold_gradients();
   PassArguments<P> a = pass_arguments(step, 0.0);
   a.scatter = false;
   run_pass(a);
+  most_bytes_ = 0;
+  count_bytes(0);
 }
 
 template <class P>
@@ -111,6 +118,7 @@ void HostEngine<P>::update_grid(double kick) {
   }
   trailing_kick_ = 0.0;
   kick_ = kick;
+  hold_velocities();
   const NodeArguments<P> a = node_arguments(kick);
   finish_sums(a);
   const auto blocks = static_cast<std::uint32_t>(owned_blocks_);

@@ -77,6 +77,16 @@ class HostEngine final : public Engine {
                 std::vector<TileReport>& reports);
   void update_stack(const Tile& tile, const NodeArguments<P>& arguments);
 
+  // Memory (host_engine_memory.cpp).
+  [[nodiscard]] bool has_few_nodes() const;  // beside particles
+  void hold_sums();
+  void hold_velocities();
+  void drop_sums();  // and the next: where nodes are few
+  void drop_velocities();
+  void drop_gradients();
+  [[nodiscard]] std::size_t bytes_held() const;
+  void count_bytes(std::size_t beside);  // held now, with some beside
+
   // Exchange with other ranks (host_engine_halo.cpp).
   [[nodiscard]] bool has_neighbours() const { return !sum_exchange_.empty() || !velocity_exchange_.empty(); }
   void send_sums();                                       // once the boundary tiles have scattered
@@ -122,7 +132,6 @@ class HostEngine final : public Engine {
   void connect_tiles();
   void insert_stacks();
   [[nodiscard]] std::vector<std::vector<BlockRequest>> reach_blocks();
-  void make_room();  // for the nodes of all blocks
   void connect_halo();
   [[nodiscard]] std::vector<mpi::SharedNodes> nodes_of(const std::vector<std::vector<BlockRequest>>& requests) const;
   void sort_cells_by_id(std::span<std::uint32_t> source, std::span<const std::uint32_t> cell_ends) const;
@@ -218,7 +227,7 @@ class HostEngine final : public Engine {
   Timeline* timeline_ = nullptr;  // of the run; null: none wanted
   PassReport report_;
   std::uint64_t gathers_ = 0;   // since the last sorting
-  std::size_t sort_bytes_ = 0;  // held by the last sorting beside the particles
+  std::size_t most_bytes_ = 0;  // held at once since the gather before the last sorting
   PassFault fault_;             // of the last pass
 };
 

@@ -146,26 +146,11 @@ void HostEngine<P>::connect_tiles() {
     });
   }
   connect_halo();
-  make_room();
+  rows_.assign(std::max(blocks_.size(), ordered_.blocks()), RowMask{});
+  if (!has_few_nodes()) hold_velocities();
   sweep_ = plan_sweep(stacks_, is_boundary_, periodicity_.blocks[0], setup_.threads);
   boundaries_.find_nodes(std::span(blocks_.keys()).first(owned_blocks_),
                          [&](std::uint32_t b) { return block_sums_[b] == BlockSums::kShared; });
-}
-
-template <class P>
-void HostEngine<P>::make_room() {
-  constexpr std::size_t kBlockReals = kBlockNodes * kChannels;
-  const std::size_t blocks = std::max(blocks_.size(), ordered_.blocks());
-  if (blocks * kBlockReals > sums_.capacity()) {
-    // The grid update has cleared every sum, so none is to be kept; some room for the next sortings.
-    sums_ = {};
-    sums_.reserve((blocks + blocks / 32) * kBlockReals);
-  }
-  sums_.resize(blocks * kBlockReals, Real(0));
-  // Read are velocities of nodes that a scatter has reached since, and with weight 0 those beside them.
-  velocities_.reserve(blocks_.size() * kBlockReals);  // else it might grow to twice that
-  velocities_.resize(blocks_.size() * kBlockReals, Real(0));
-  rows_.assign(blocks, RowMask{});
 }
 
 template <class P>

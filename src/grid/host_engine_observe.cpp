@@ -192,15 +192,9 @@ EngineStats HostEngine<P>::stats() const {
     stats.halo_in_flight += f.in_flight.count();
     stats.halo_waited += f.waited.count();
   }
-  for (int g = 0; g < kGroupCount; ++g) {
-    if (store_.has(static_cast<Group>(g))) {
-      stats.particle_bytes += store_.packs() * ParticleStore<P>::stride(static_cast<Group>(g));
-    }
-  }
-  stats.particle_bytes +=
-      flaw_codes_.capacity() * sizeof(material::FlawCode) + lone_pull_.capacity() * sizeof(LonePull<P>);
   stats.grid_bytes = (sums_.capacity() + velocities_.capacity()) * sizeof(Real);
-  stats.sort_bytes = sort_bytes_;
+  stats.particle_bytes = bytes_held() - stats.grid_bytes;
+  stats.sort_bytes = most_bytes_ - std::min(most_bytes_, bytes_held());
   return stats;
 }
 

@@ -102,11 +102,8 @@ void HostEngine<P>::settle(std::span<const Placement> placements) {
 template <class P>
 template <class F>
 void HostEngine<P>::settle_each(F&& for_each_placement) {
-  // Velocities follow from the next scatter. Where nodes are few beside particles, it costs little to clear them anew,
-  // and their memory is room for the places of particles.
-  const std::size_t of_nodes = velocities_.capacity() * sizeof(Real);
-  const bool given_back = 8 * of_nodes < store_.packs() * kLanes * store_.record_bytes();
-  if (given_back) velocities_ = {};
+  drop_sums();
+  drop_velocities();
   Occupancy occupancy;
   std::vector<std::vector<std::byte>> leaving(static_cast<std::size_t>(comm_.size()));
   for_each_placement([&](const Placement& p) {
@@ -119,7 +116,6 @@ void HostEngine<P>::settle_each(F&& for_each_placement) {
   });
   if (comm_.size() > 1) take_records(comm_.alltoall(leaving), occupancy);
   arrange(occupancy);
-  if (given_back) sort_bytes_ -= std::min(sort_bytes_, of_nodes);
   connect_tiles();
   report_ = {};
   gathers_ = 0;
@@ -214,7 +210,7 @@ void HostEngine<P>::arrange(Occupancy& occupancy) {
   if (setup_.numerics.reproducible) sort_cells_by_id(source, place);
   lone_pull_.resize(packs_for(alone));
   const std::size_t beside = store_.gather(source, setup_.threads);
-  sort_bytes_ = (source.capacity() + place.capacity()) * sizeof(std::uint32_t) + beside;
+  count_bytes((source.capacity() + place.capacity()) * sizeof(std::uint32_t) + beside);
   // Empty lanes take part in the passes, with mass 0, so they need a node as well.
   for (std::size_t slot = 0; slot < source.size(); ++slot) {
     if (source[slot] != ParticleStore<P>::kEmpty) continue;
@@ -273,7 +269,7 @@ void HostEngine<P>::switch_damage_off() {
   setup_.effects.damage = false;
   setup_.effects.fully_damaged = true;
   store_.drop_damage();
-  flaw_codes_ = {};
+  release(flaw_codes_);
 }
 
 template class HostEngine<MixedPrecision>;

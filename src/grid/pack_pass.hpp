@@ -69,6 +69,7 @@ class PackPass {
     }
     if (a_.scatter) {
       if (fx_.damage) prefetch(a_.flaws + i + 1);
+      if (fx_.damage || fx_.strength) prefetch(a_.damage_level + i + 1);
       for_each_material(i, state, [&](const material::Constants<Real>& c, material::State<T>& s) BRECCIA_INLINE_LAMBDA {
         stress(c, s, out.gradient, i, lost, out.tau);
       });

@@ -244,8 +244,26 @@ template <class P>
 void ParticleStore<P>::drop_damage() {
   groups_.flaws = false;
   groups_.damage_level = false;
-  flaws = {};
-  damage_level = {};
+  release(flaws);
+  release(damage_level);
+}
+
+template <class P>
+void ParticleStore<P>::hold_gradients() {
+  affine.resize(packs());
+}
+
+template <class P>
+void ParticleStore<P>::drop_gradients() {
+  release(affine);
+}
+
+template <class P>
+std::size_t ParticleStore<P>::bytes() const {
+  std::size_t bytes = 0;
+  const_cast<ParticleStore*>(this)->for_each_group(
+      [&](Group group, const auto& array) { bytes += array.size() * stride(group); });
+  return bytes;
 }
 
 template <class P>

@@ -88,7 +88,8 @@ struct Identity {
   typename P::IntPack body_material;
 };
 
-/// Velocity gradient C^{n-1/2} [1/s], row by row. Filled only where a step is taken in two halves (window starts).
+/// Velocity gradient C^{n-1/2} [1/s], row by row. Filled only where a step is taken in two halves (window
+/// starts), and held only there if no particle is alone and nodes are few.
 template <class P>
 struct Affine {
   typename P::RealPack gradient[9];
@@ -142,6 +143,11 @@ class ParticleStore {
   [[nodiscard]] static std::size_t bytes_per_particle(const GroupSet& groups);
   /// Frees what only damage growth needs, once every particle has D = 1.
   void drop_damage();
+  /// Room for the velocity gradients of all packs, for whoever writes them next; frees it.
+  void hold_gradients();
+  void drop_gradients();
+  /// Of all arrays, without the room behind them that nothing has touched.
+  [[nodiscard]] std::size_t bytes() const;
 
   /// Rearranges: new slot s holds what old slot source[s] held; kEmpty makes an empty lane. source.size() is a multiple
   /// of the lanes. One group at a time. In place where no particle comes from far, so that the memory needed beside the

@@ -51,7 +51,7 @@ BRECCIA_HD GatheredVelocity<P> gather(const typename P::Real* nodes, const Stenc
 
 /// Adds to the nodes of the tile. Lanes from `lanes` on are left out.
 template <class P>
-BRECCIA_HD void scatter(typename P::Real* nodes, const Stencil<P>& s, int lanes, SpreadMomentum<P> q) {
+BRECCIA_HD void scatter(typename P::Real* nodes, const Stencil<P>& s, int lanes, SpreadMomentum<P>&& q) {
   // The linear field at the nearest node instead of at the particle.
   for (int c = 0; c < 6; ++c) {
     q.value[c] = q.value[c] - s.offset[0] * q.by_x[c] - s.offset[1] * q.by_y[c] - s.offset[2] * q.by_z[c];

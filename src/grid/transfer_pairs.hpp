@@ -120,10 +120,16 @@ BRECCIA_HD void scatter_pairs(typename P::Real* nodes, const Stencil<P>& s, int 
   using Real = typename P::Real;
   using T = typename P::RealPack;
   const T zero(Real(0));
-  T value_x[16] = {q.value[0], q.value[1], q.value[2], q.value[3], q.value[4], q.value[5], q.value[6], zero,
-                   q.by_x[0],  q.by_x[1],  q.by_x[2],  q.by_x[3],  q.by_x[4],  q.by_x[5],  zero,       zero};
-  T y_z[16] = {q.by_y[0], q.by_y[1], q.by_y[2], q.by_y[3], q.by_y[4], q.by_y[5], zero, zero,
-               q.by_z[0], q.by_z[1], q.by_z[2], q.by_z[3], q.by_z[4], q.by_z[5], zero, zero};
+  // Assigned one by one: of a list the compiler makes a copy in memory, with a slow string instruction.
+  T value_x[16], y_z[16];
+  for (int c = 0; c < 7; ++c) value_x[c] = q.value[c];
+  for (int c = 0; c < 6; ++c) {
+    value_x[8 + c] = q.by_x[c];
+    y_z[c] = q.by_y[c];
+    y_z[8 + c] = q.by_z[c];
+  }
+  value_x[7] = value_x[14] = value_x[15] = zero;
+  y_z[6] = y_z[7] = y_z[14] = y_z[15] = zero;
   transpose16(value_x);
   transpose16(y_z);
   alignas(64) Real row[2][16][16];

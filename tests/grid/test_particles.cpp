@@ -67,6 +67,20 @@ TEST(FlawStates, SurviveTheirWord) {
   }
 }
 
+// Groups that nobody needs any more leave no memory behind.
+TYPED_TEST(Particles, GiveMemoryBack) {
+  using P = TypeParam;
+  ParticleStore<P> store = this->filled(50);
+  store.drop_damage();
+  EXPECT_EQ(store.flaws.capacity() + store.damage_level.capacity(), 0U);
+  const std::size_t with_gradients = store.bytes();
+  store.drop_gradients();
+  EXPECT_EQ(store.affine.capacity(), 0U);
+  EXPECT_EQ(store.bytes(), with_gradients - 50 * sizeof(Affine<P>));
+  store.hold_gradients();
+  EXPECT_EQ(store.bytes(), with_gradients);
+}
+
 // At 8 per cell the nodes are 16 bytes a particle and 13 flaws 26 more: together at most 200 while damage grows.
 TEST(ParticleBytes, LeaveRoomForGridAndFlaws) {
   GroupSet groups = kAllGroups;

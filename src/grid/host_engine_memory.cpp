@@ -1,0 +1,68 @@
+// What the engine holds when. Where nodes are few beside particles, the memory of an array is given back around a
+// sorting while nobody needs it: that of the sums before the half step that only gathers, of the nodes' velocities from
+// the sorting to the next grid update, of the velocity gradients after the half step that only scatters. Where nodes
+// are many, to clear them anew would cost more than it gives.
+#include <algorithm>
+
+#include "grid/host_engine.hpp"
+
+namespace breccia::grid {
+
+namespace {
+constexpr std::size_t kBlockReals = kBlockNodes * kChannels;
+}
+
+template <class P>
+bool HostEngine<P>::has_few_nodes() const {
+  return 8 * blocks_.size() * kBlockReals * sizeof(Real) < store_.packs() * kLanes * store_.record_bytes();
+}
+
+template <class P>
+void HostEngine<P>::hold_sums() {
+  const std::size_t blocks = std::max(blocks_.size(), ordered_.blocks());
+  if (blocks * kBlockReals > sums_.capacity()) {
+    // The grid update has cleared every sum, so none is to be kept; some room for the next sortings.
+    release(sums_);
+    sums_.reserve((has_few_nodes() ? blocks : blocks + blocks / 32) * kBlockReals);
+  }
+  sums_.resize(blocks * kBlockReals, Real(0));
+}
+
+template <class P>
+void HostEngine<P>::hold_velocities() {
+  // Read are velocities of nodes that a scatter has reached since, and with weight 0 those beside them.
+  velocities_.reserve(blocks_.size() * kBlockReals);  // else it might grow to twice that
+  velocities_.resize(blocks_.size() * kBlockReals, Real(0));
+}
+
+template <class P>
+void HostEngine<P>::drop_sums() {
+  if (has_few_nodes()) release(sums_);
+}
+
+template <class P>
+void HostEngine<P>::drop_velocities() {
+  if (has_few_nodes()) release(velocities_);
+}
+
+template <class P>
+void HostEngine<P>::drop_gradients() {
+  // A lone particle keeps its own from step to step.
+  if (has_few_nodes() && lone_.particles == 0) store_.drop_gradients();
+}
+
+template <class P>
+std::size_t HostEngine<P>::bytes_held() const {
+  return store_.bytes() + (sums_.capacity() + velocities_.capacity()) * sizeof(Real) +
+         flaw_codes_.capacity() * sizeof(material::FlawCode) + lone_pull_.capacity() * sizeof(LonePull<P>);
+}
+
+template <class P>
+void HostEngine<P>::count_bytes(std::size_t beside) {
+  most_bytes_ = std::max(most_bytes_, bytes_held() + beside);
+}
+
+template class HostEngine<MixedPrecision>;
+template class HostEngine<DoublePrecision>;
+
+}  // namespace breccia::grid
