@@ -1,5 +1,6 @@
 // The JSON of a checkpoint: refused with one line, or read to a state that is written and read back as the same.
 #include "sim/run_state.hpp"
+#include "sim/same_scene.hpp"
 
 #include "tests/fuzz/target.hpp"
 
