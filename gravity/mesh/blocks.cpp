@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <iterator>
-#include <map>
 
 namespace breccia::gravity {
 
@@ -62,32 +61,6 @@ Blocks count_in_blocks(ParticlesView particles, double width) {
     here->add(1, particles.mass[i], {p, p});
   }
   return blocks;
-}
-
-std::vector<Occupancy> occupancy(ParticlesView particles, double width, const mpi::Comm& comm) {
-  struct Share {
-    BlockIndex index;
-    std::int32_t unused;
-    std::int64_t count;
-  };
-  // Each block is added up on the rank its hash names.
-  const auto ranks = static_cast<std::size_t>(comm.size());
-  std::vector<std::vector<Share>> to(ranks);
-  const Blocks own = count_in_blocks(particles, width);
-  for (const Block& b : own.all()) to[hash_of(b.index) % ranks].push_back({b.index, 0, b.count});
-  Blocks mine;
-  for (const std::vector<Share>& from : comm.alltoall(to)) {
-    for (const Share& s : from) mine.at(s.index).count += s.count;
-  }
-  std::map<std::int64_t, std::int64_t> number;
-  for (const Block& b : mine.all()) ++number[b.count];
-  std::vector<Occupancy> here;
-  for (const auto& [count, blocks] : number) here.push_back({count, blocks});
-  number.clear();
-  for (const Occupancy& o : comm.allgather_arrays(std::span<const Occupancy>(here))) number[o.particles] += o.blocks;
-  std::vector<Occupancy> all;
-  for (const auto& [count, blocks] : number) all.push_back({count, blocks});
-  return all;
 }
 
 }  // namespace breccia::gravity

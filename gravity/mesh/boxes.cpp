@@ -3,8 +3,11 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <numeric>
 
-#include "gravity/mesh/block_sieve.hpp"
+#include "gravity/mesh/block_pairs.hpp"
+#include "gravity/mesh/geometry.hpp"
 
 namespace breccia::gravity {
 
@@ -39,98 +42,74 @@ struct Region {
   std::int64_t count = 0;
 };
 
-template <class F>
-void for_each_around(BlockIndex b, const F& f) {
-  for (int dx = -1; dx <= 1; ++dx) {
-    for (int dy = -1; dy <= 1; ++dy) {
-      for (int dz = -1; dz <= 1; ++dz) f(BlockIndex{b.x + dx, b.y + dy, b.z + dz});
-    }
-  }
-}
-
-template <class F>
-void for_each_neighbour(const Blocks& blocks, BlockIndex b, const F& f) {
-  for_each_around(b, [&](BlockIndex index) {
-    const std::int64_t n = blocks.find(index);
-    if (n >= 0) f(static_cast<std::size_t>(n));
-  });
-}
-
-std::vector<BlockIndex> with_neighbours(const Blocks& blocks) {
-  std::vector<BlockIndex> all;
-  for (const Block& b : blocks.all()) for_each_around(b.index, [&](BlockIndex index) { all.push_back(index); });
-  return all;
-}
-
-// Blocks that hold `least` particles of all ranks, the same on all of them but for the order. Counts them, those of
-// this rank, into `own`.
-Blocks dense_blocks(const BlockSieve& sieve, Blocks& own, std::int64_t least, const mpi::Comm& comm) {
+// Blocks that hold `least` particles of all ranks, sorted.
+std::vector<BlockIndex> dense_blocks(Census& census, std::int64_t least, const mpi::Comm& comm) {
   const std::int64_t share = comm.size() == 1 ? least : std::max(kLeastNamed, (least + comm.size() - 1) / comm.size());
-  sieve.count_crowded(share, own);
   std::vector<BlockIndex> named;
-  for (const Block& b : own.all()) {
-    if (b.count >= share) named.push_back(b.index);
-  }
-  const std::vector<BlockIndex> named_by_all = comm.allgather_arrays(std::span<const BlockIndex>(named));
-  sieve.count(named_by_all, own);
-  Blocks all;
-  for (const BlockIndex& index : named_by_all) all.at(index);
-  std::vector<std::int64_t> counts;
-  for (const Block& b : all.all()) {
-    const std::int64_t here = own.find(b.index);
-    counts.push_back(here >= 0 ? own.all()[static_cast<std::size_t>(here)].count : 0);
-  }
+  for (const BlockCount& b : census.crowded(share)) named.push_back(b.index);
+  std::vector<BlockIndex> dense = comm.allgather_arrays(std::span<const BlockIndex>(named));
+  std::sort(dense.begin(), dense.end());
+  if (comm.size() == 1) return dense;
+  dense.erase(std::unique(dense.begin(), dense.end()), dense.end());
+  std::vector<std::int64_t> counts = census.counts(dense);
   comm.sum(std::span<std::int64_t>(counts));
-  Blocks dense;
+  std::size_t kept = 0;
   for (std::size_t i = 0; i < counts.size(); ++i) {
-    if (counts[i] >= least) dense.at(all.all()[i].index).count = counts[i];
+    if (counts[i] >= least) dense[kept++] = dense[i];
   }
+  dense.resize(kept);
   return dense;
 }
 
-// Numbers the connected parts of the dense blocks; returns how many there are.
-std::size_t number_parts(const Blocks& dense, std::vector<std::size_t>& part) {
-  constexpr std::size_t kNone = ~std::size_t{0};
-  part.assign(dense.all().size(), kNone);
+// Numbers the connected parts of the dense blocks in their order; returns how many there are.
+std::size_t number_parts(std::span<const BlockIndex> dense, std::vector<std::size_t>& part) {
+  // Each block is in the part of an earlier one that it touches, or begins one: a forest, kept flat.
+  std::vector<std::size_t> earlier(dense.size());
+  std::iota(earlier.begin(), earlier.end(), std::size_t{0});
+  const auto first_of = [&](std::size_t i) {
+    while (earlier[i] != i) i = earlier[i] = earlier[earlier[i]];
+    return i;
+  };
+  for_each_touching(dense, dense, [&](std::size_t i, std::size_t j) {
+    if (j >= i || earlier[i] == earlier[j]) return;
+    const std::size_t a = first_of(i);
+    const std::size_t b = first_of(j);
+    earlier[std::max(a, b)] = std::min(a, b);
+  });
   std::size_t parts = 0;
-  for (std::size_t start = 0; start < part.size(); ++start) {
-    if (part[start] != kNone) continue;
-    std::vector<std::size_t> front{start};
-    part[start] = parts;
-    while (!front.empty()) {
-      const BlockIndex here = dense.all()[front.back()].index;
-      front.pop_back();
-      for_each_neighbour(dense, here, [&](std::size_t n) {
-        if (part[n] != kNone) return;
-        part[n] = parts;
-        front.push_back(n);
-      });
-    }
-    ++parts;
-  }
+  part.resize(dense.size());
+  for (std::size_t i = 0; i < dense.size(); ++i) part[i] = earlier[i] == i ? parts++ : part[earlier[i]];
   return parts;
 }
 
 // The connected parts of the dense blocks, with the bounds of all particles in and next to them.
-std::vector<Region> dense_regions(const Blocks& own, const Blocks& dense, const mpi::Comm& comm) {
+std::vector<Region> dense_regions(std::span<const Block> blocks, std::span<const BlockIndex> dense,
+                                  const mpi::Comm& comm) {
   constexpr double kFar = std::numeric_limits<double>::max();
   std::vector<std::size_t> part;
   const std::size_t parts = number_parts(dense, part);
   std::vector<double> sums(2 * parts, 0.0);
   std::vector<double> extremes(6 * parts, -kFar);  // highest coordinates and the negative of the lowest
-  for (std::size_t i = 0; i < part.size(); ++i) {
-    const BlockIndex index = dense.all()[i].index;
-    const std::int64_t here = own.find(index);
-    if (here >= 0) {
-      sums[2 * part[i]] += static_cast<double>(own.all()[static_cast<std::size_t>(here)].count);
-      sums[2 * part[i] + 1] += own.all()[static_cast<std::size_t>(here)].mass;
+  std::vector<const Block*> own;
+  for (const Block& b : blocks) own.push_back(&b);
+  std::sort(own.begin(), own.end(), [](const Block* a, const Block* b) { return a->index < b->index; });
+  std::vector<BlockIndex> own_index;
+  for (const Block* b : own) own_index.push_back(b->index);
+  std::vector<std::size_t> bounded(own.size(), parts);  // the part whose bounds each has widened last
+  for_each_touching(own_index, dense, [&](std::size_t i, std::size_t j) {
+    const Block& b = *own[i];
+    const std::size_t p = part[j];
+    if (own_index[i] == dense[j]) {
+      sums[2 * p] += static_cast<double>(b.count);
+      sums[2 * p + 1] += b.mass;
     }
-    for_each_neighbour(own, index, [&](std::size_t n) {
-      const Box& b = own.all()[n].bounds;
-      const double values[6] = {b.high.x, b.high.y, b.high.z, -b.low.x, -b.low.y, -b.low.z};
-      for (std::size_t k = 0; k < 6; ++k) extremes[6 * part[i] + k] = std::max(extremes[6 * part[i] + k], values[k]);
-    });
-  }
+    if (bounded[i] == p) return;
+    bounded[i] = p;
+    const Vec3d high = b.bounds.high;
+    const Vec3d low = b.bounds.low;
+    const double values[6] = {high.x, high.y, high.z, -low.x, -low.y, -low.z};
+    for (std::size_t k = 0; k < 6; ++k) extremes[6 * p + k] = std::max(extremes[6 * p + k], values[k]);
+  });
   comm.sum(std::span<double>(sums));
   comm.max(std::span<double>(extremes));
   std::vector<Region> regions;
@@ -169,6 +148,32 @@ bool merge_one_pair(std::vector<Region>& regions, double cell) {
   return false;
 }
 
+// How many blocks hold how many particles, those of all ranks counted together.
+struct Occupancy {
+  std::int64_t particles;  // in each of these blocks
+  std::int64_t blocks;
+};
+
+// Emptiest blocks first. Each rank sees a share of the blocks of all: those that their hash deals out to it.
+std::vector<Occupancy> occupancy(Census& census, double width, const mpi::Comm& comm) {
+  const auto ranks = static_cast<std::size_t>(comm.size());
+  std::vector<std::vector<BlockCount>> to(ranks);
+  for (const BlockCount& b : census.occupied(width)) to[hash_of(b.index) % ranks].push_back(b);
+  Blocks mine;
+  for (const std::vector<BlockCount>& from : comm.alltoall(to)) {
+    for (const BlockCount& b : from) mine.at(b.index).count += b.particles;
+  }
+  std::map<std::int64_t, std::int64_t> number;
+  for (const Block& b : mine.all()) ++number[b.count];
+  std::vector<Occupancy> here;
+  for (const auto& [count, blocks] : number) here.push_back({count, blocks});
+  number.clear();
+  for (const Occupancy& o : comm.allgather_arrays(std::span<const Occupancy>(here))) number[o.particles] += o.blocks;
+  std::vector<Occupancy> all;
+  for (const auto& [count, blocks] : number) all.push_back({count, blocks});
+  return all;
+}
+
 // Of the particles in the emptier blocks, so that these hold `fraction` of them all, the last one's block's count.
 std::int64_t count_at(std::span<const Occupancy> sorted, double fraction) {
   std::int64_t all = 0;
@@ -191,22 +196,19 @@ std::int64_t median_dense_count(std::vector<Occupancy> blocks) {
 
 }  // namespace
 
-std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double cell, const mpi::Comm& comm,
-                              int threads) {
+std::vector<Box> choose_boxes(Census& census, double spacing, double cell, const mpi::Comm& comm) {
   std::int64_t full = kFullCount;
   double width = kBlockWidth * spacing;
-  const std::uint64_t all = comm.sum(static_cast<std::uint64_t>(particles.position.size()));
+  const std::uint64_t all = comm.sum(census.particles());
   while (all > kMostDenseBlocks * static_cast<std::uint64_t>(full)) {
     full *= 8;
     width *= 2.0;
   }
-  const BlockSieve sieve(particles, width, threads);
-  const double total = comm.sum(sieve.mass());
+  census.divide(width);
+  const double total = comm.sum(census.mass());
   const auto least = static_cast<std::int64_t>(kDense * static_cast<double>(full));
-  Blocks own;
-  const Blocks dense = dense_blocks(sieve, own, least, comm);
-  sieve.count(with_neighbours(dense), own);
-  std::vector<Region> regions = dense_regions(own, dense, comm);
+  const std::vector<BlockIndex> dense = dense_blocks(census, least, comm);
+  std::vector<Region> regions = dense_regions(census.around(dense), dense, comm);
   std::erase_if(regions, [&](const Region& r) {
     return r.count < kLeastBoxParticles || r.mass < kLeastBoxMass * total ||
            static_cast<double>(r.count) < kLeastParticlesPerNode * mesh_nodes(r.box, cell);
@@ -223,14 +225,15 @@ std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double ce
   return boxes;
 }
 
-double dense_spacing(ParticlesView particles, const mpi::Comm& comm) {
+double dense_spacing(Census& census, const mpi::Comm& comm) {
   // Between 16 and 128 particles in the median dense particle's block. The width is changed towards 45; blocks that are
   // filled in part hold more after that than expected.
   constexpr std::int64_t kFewest = 16;
   constexpr std::int64_t kMost = 128;
   constexpr double kWanted = 45.0;
   Block own{};
-  for (const Vec3d p : particles.position) own.add(1, 0.0, {p, p});
+  own.count = static_cast<std::int64_t>(census.particles());
+  if (own.count > 0) own.bounds = census.bounds();
   Block all{};
   for (const Block& b : comm.allgather(own)) {
     if (b.count > 0) all.add(b.count, 0.0, b.bounds);
@@ -239,7 +242,7 @@ double dense_spacing(ParticlesView particles, const mpi::Comm& comm) {
   double width = std::max({extent.x, extent.y, extent.z});
   if (all.count < 2 || !(width > 0.0)) return 1.0;
   for (int trial = 0;; ++trial) {
-    const std::int64_t count = median_dense_count(occupancy(particles, width, comm));
+    const std::int64_t count = median_dense_count(occupancy(census, width, comm));
     const double spacing = width / std::cbrt(static_cast<double>(count));
     if ((count >= kFewest && count <= kMost) || (count <= kMost && trial == 0) || trial == 40) return spacing;
     width *= std::cbrt(kWanted / static_cast<double>(count));

@@ -3,8 +3,8 @@
 
 #include <vector>
 
-#include "gravity/mesh/geometry.hpp"
-#include "gravity/solver.hpp"
+#include "gravity/mesh/census.hpp"
+#include "mpi/comm.hpp"
 
 namespace breccia::gravity {
 
@@ -16,13 +16,13 @@ inline constexpr double kLeastBoxMass = 0.1;  ///< fraction of all mass
 /// least three eighths at mean distance `spacing` [m] that hold a tenth of the mass and 1000 particles. Boxes that
 /// overlap become one, and so do boxes that share a mesh of `cell` [m] at less than twice the cost of two. The same on
 /// all ranks, and but for rounding the same for any distribution of the particles. Collective.
-std::vector<Box> choose_boxes(ParticlesView particles, double spacing, double cell, const mpi::Comm& comm, int threads);
+std::vector<Box> choose_boxes(Census& census, double spacing, double cell, const mpi::Comm& comm);
 
 /// Nodes of the mesh around `box`, not doubled.
 double mesh_nodes(const Box& box, double cell);
 
 /// Mean distance of the particles where they are dense [m]: from the number of neighbours that the
 /// median one of those has in its block of space. 1 if there are fewer than two places. Collective.
-double dense_spacing(ParticlesView particles, const mpi::Comm& comm);
+double dense_spacing(Census& census, const mpi::Comm& comm);
 
 }  // namespace breccia::gravity

@@ -1,29 +1,31 @@
 #include "gravity/mesh/layout.hpp"
 
-#include <algorithm>
 #include <cmath>
 #include <numeric>
 
+#include "gravity/mesh/geometry.hpp"
+#include "gravity/mesh/host_census.hpp"
+
 namespace breccia::gravity {
 
-Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi::Comm& comm, int threads) {
+Layout lay_boxes(Census& census, const MeshParameters& mesh, const mpi::Comm& comm) {
   Layout layout;
-  layout.spacing = mesh.particle_spacing > 0.0 ? mesh.particle_spacing : dense_spacing(particles, comm);
+  layout.spacing = mesh.particle_spacing > 0.0 ? mesh.particle_spacing : dense_spacing(census, comm);
   layout.cell = mesh.cell > 0.0 ? mesh.cell : kCellsPerSpacing * layout.spacing;
-  layout.boxes = choose_boxes(particles, layout.spacing, layout.cell, comm, threads);
-  layout.set.assign(particles.position.size(), 0);
-#pragma omp parallel for num_threads(threads) schedule(static)
-  for (std::size_t i = 0; i < layout.set.size(); ++i) {
-    layout.set[i] = set_of(particles.position[i], layout.boxes.data(), layout.boxes.size());
-  }
-  for (std::size_t k = 0; k <= layout.boxes.size(); ++k) {
-    const auto here = std::count(layout.set.begin(), layout.set.end(), static_cast<std::uint8_t>(k));
-    layout.count.push_back(static_cast<std::uint64_t>(here));
+  layout.boxes = choose_boxes(census, layout.spacing, layout.cell, comm);
+  for (const SetSum& sum : census.sets(layout.boxes)) {
+    layout.count.push_back(sum.particles);
+    layout.mass.push_back(sum.mass);
   }
   comm.sum(std::span<std::uint64_t>(layout.count));
-  layout.mass.assign(layout.count.size(), 0.0);
-  for (std::size_t i = 0; i < layout.set.size(); ++i) layout.mass[layout.set[i]] += particles.mass[i];
   comm.sum(std::span<double>(layout.mass));
+  return layout;
+}
+
+Layout lay_boxes(ParticlesView particles, const MeshParameters& mesh, const mpi::Comm& comm, int threads) {
+  HostCensus census(particles, threads);
+  Layout layout = lay_boxes(census, mesh, comm);
+  layout.set.swap(census.set_of_each());
   return layout;
 }
 

@@ -103,11 +103,19 @@ enum class BalanceMode {
   kAuto     ///< cut anew where the work has become uneven
 };
 
+/// What carries sums of the grid between CUDA devices of several ranks.
+enum class DeviceMessages {
+  kMpi,   ///< MPI, which makes the host wait once a step
+  kNccl,  ///< NCCL, from device to device
+  kAuto   ///< NCCL where it can be used
+};
+
 /// How the work is shared by ranks.
 struct ParallelParameters {
   BalanceMode balance = BalanceMode::kAuto;
   double imbalance = 1.05;  ///< largest over mean work of the ranks that kAuto lets be
   std::optional<int> axis;  ///< 0, 1, 2: slabs across x, y, z; none: across the longest extent of the matter
+  DeviceMessages device_messages = DeviceMessages::kMpi;
 };
 
 struct TimeParameters {

@@ -198,6 +198,10 @@ std::vector<Setting> settings(const GravityBenchOptions& options, std::int64_t n
     list.push_back({"treepm", fmt::format("error {:.1e}", error), GravityMethod::kTreePm, p});
   }
   list.push_back({"auto", "default", GravityMethod::kAuto, {.softening = softening}});
+  const auto& wanted = options.methods;
+  std::erase_if(list, [&](const Setting& s) {
+    return !wanted.empty() && std::find(wanted.begin(), wanted.end(), s.method) == wanted.end();
+  });
   return list;
 }
 

@@ -10,6 +10,7 @@ namespace breccia::bench {
 struct GravityBenchOptions {
   bool quick = false;                   ///< 94,648 particles only
   std::string states = "abc";           ///< of gravity_states.hpp
+  std::vector<std::string> methods;     ///< to measure; empty: all
   std::vector<std::int64_t> particles;  ///< empty: 94,648 and, unless quick, 1e6
   std::vector<double> openings;         ///< of the tree; empty: fast, default and tight
   bool body = false;                    ///< the net force on the first body at more than 100,000 particles too

@@ -29,6 +29,8 @@ int measure(int argc, char** argv) {
   CLI::App* gravity = app.add_subcommand("gravity", "time and error of self-gravity");
   gravity->add_flag("--quick", gravity_options.quick, "94,648 particles only");
   gravity->add_option("--states", gravity_options.states, "some of a, b, c, n, f, p, q");
+  gravity->add_option("--methods", gravity_options.methods, "some of direct (of a device), tree, treepm, auto")
+      ->check(CLI::IsMember({"direct", "tree", "treepm", "auto"}));
   gravity->add_option("--particles", gravity_options.particles, "numbers of particles");
   gravity->add_option("--opening", gravity_options.openings, "tolerances of the tree");
   gravity->add_flag("--body", gravity_options.body, "net force on the first body at a million particles too: a minute");

@@ -1,3 +1,4 @@
+#include <chrono>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -9,9 +10,13 @@
 #include "cli/scene_options.hpp"
 #include "scene/units.hpp"
 #include "sim/run.hpp"
+#include "sim/stop_requests.hpp"
 
 namespace breccia::cli {
 namespace {
+
+// When the program began, before MPI did.
+const auto kStart = std::chrono::steady_clock::now();
 
 struct Options {
   SceneOptions scene;
@@ -51,7 +56,9 @@ grid::Device device_named(const std::string& name) {
 }
 
 void run(const Options& options, const mpi::Comm& comm) {
+  sim::keep_stop_signals();
   sim::RunOptions run_options;
+  run_options.started = kStart;
   run_options.out = options.out;
   if (!options.until.empty()) run_options.until = parse_until(options.until);
   run_options.steps = options.steps;

@@ -24,7 +24,8 @@ CudaEngine<P>::CudaEngine(const grid::EngineSetup& setup, const mpi::Comm& comm)
       particles_(grid::groups_for(setup)),
       // Walls act on nodes: a particle needs them near one.
       grid_(boundaries_.periodicity(), setup.numerics.lone_without_grid && !boundaries_.has_walls()),
-      transfer_(transfer_of<Real>(setup.numerics)) {
+      transfer_(transfer_of<Real>(setup.numerics)),
+      halo_(setup.device_messages, comm) {
   setup_.divide_blocks = false;  // halo.cpp: ranks share whole blocks
   std::vector<material::Constants<Real>> constants;
   std::vector<material::Constants<double>> double_constants;
@@ -129,7 +130,7 @@ template <class P>
 void CudaEngine<P>::update_grid(double kick) {
   kick_ = kick;
   if (std::exchange(grid_is_ahead_, false)) return;
-  halo_.receive(comm_, stream_);
+  halo_.receive(stream_);
   launch_node_update(node_arguments(kick), stream_);
 }
 
@@ -148,6 +149,7 @@ double CudaEngine<P>::sort() {
 
 template <class P>
 bool CudaEngine<P>::strayed() const {
+  halo_.watch(stream_);
   grid_.count_lone_drift(particles_, const_cast<unsigned*>(counts_.data()), stream_);
   return counts_.download(1, stream_)[0] != 0;
 }
@@ -166,6 +168,7 @@ void CudaEngine<P>::settle() {
 
 template <class P>
 grid::PassReport CudaEngine<P>::passes() const {
+  halo_.watch(stream_);
   launch_total(pass_sums_.data(), grid_.pass_blocks(), total_.data(), stream_);
   const PassSums sums = total_.download(1, stream_)[0];
   grid::PassReport report;
@@ -205,7 +208,7 @@ template <class P>
 std::unique_ptr<gravity::ResidentSolver> CudaEngine<P>::make_resident_solver(GravityMethod method,
                                                                              const gravity::Parameters& parameters) {
   auto solver = std::make_unique<CudaGravity<Real>>(
-      method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_, setup_.threads);
+      method, parameters, [this](double time) { return predict_arguments(time); }, comm_, stream_);
   solver->require_memory();
   return solver;
 }

@@ -94,6 +94,7 @@ std::vector<double> CudaEngine<P>::hencky_norms() const {
 
 template <class P>
 ParticleOutput CudaEngine<P>::observe() const {
+  halo_.watch(stream_);
   const unsigned count = particles_.count();
   DeviceArray<Real> new_velocity(std::size_t{count} * 3);
   DeviceArray<Real> node_mass(count);

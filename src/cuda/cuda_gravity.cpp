@@ -21,9 +21,15 @@ namespace breccia::cuda {
 
 using gravity::Phase;
 
+namespace {
+
+double mass_unit_of(const Extremes& extremes) { return extremes.of[6] > 0.0 ? extremes.of[6] : 1.0; }
+
+}  // namespace
+
 template <class Real>
 CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles,
-                               const mpi::Comm& comm, cudaStream_t stream, int threads)
+                               const mpi::Comm& comm, cudaStream_t stream)
     : method_(method),
       parameters_(method == GravityMethod::kTreePm || method == GravityMethod::kAuto
                       ? gravity::with_checked_mesh(parameters)
@@ -31,18 +37,18 @@ CudaGravity<Real>::CudaGravity(GravityMethod method, const gravity::Parameters& 
       particles_(std::move(particles)),
       comm_(comm),
       stream_(stream),
-      threads_(threads),
       bodies_(comm, stream),
+      census_(stream),
       sets_(stream),
       unsplit_(comm, stream) {}
 
-// By the host, by its rule.
+// By the host, from what the device counts.
 template <class Real>
-gravity::Layout CudaGravity<Real>::lay_boxes() {
+gravity::Layout CudaGravity<Real>::lay_boxes(double heaviest) {
   gravity::Layout layout;
   stats_.phases.time(Phase::kBoxes, [&] {
-    const HostBodies own = bodies_.own_on_host();
-    layout = gravity::lay_boxes({own.position, own.mass}, parameters_.mesh, comm_, threads_);
+    census_.take(bodies_.own_bodies(), heaviest);
+    layout = gravity::lay_boxes(census_, parameters_.mesh, comm_);
   });
   return layout;
 }
@@ -54,9 +60,10 @@ bool CudaGravity<Real>::needs_boxes(std::uint64_t particles) const {
 }
 
 template <class Real>
-gravity::MethodChoice CudaGravity<Real>::choose_method(std::uint64_t particles, gravity::Layout& layout) {
+gravity::MethodChoice CudaGravity<Real>::choose_method(std::uint64_t particles, double heaviest,
+                                                       gravity::Layout& layout) {
   const bool with_boxes = needs_boxes(particles);
-  if (with_boxes) layout = lay_boxes();
+  if (with_boxes) layout = lay_boxes(heaviest);
   if (method_ != GravityMethod::kAuto) return {method_, ""};
   const gravity::Matter matter = with_boxes ? gravity::matter_of(layout) : gravity::Matter{.particles = particles};
   return cheapest_on_device(matter, parameters_, kDeviceRates<Real>, comm_.size());
@@ -66,17 +73,24 @@ template <class Real>
 void CudaGravity<Real>::require_memory() {
   const PredictArguments<Real> own = particles_(0.0);
   const std::uint64_t all = comm_.sum(std::uint64_t{own.count});
-  if (needs_boxes(all)) bodies_.gather(own);
+  const bool seeks_boxes = needs_boxes(all);
+  double heaviest = 1.0;
+  if (seeks_boxes) {
+    bodies_.gather(own);
+    heaviest = mass_unit_of(bodies_.extremes());
+  }
   gravity::Layout layout;
-  const GravityMethod method = choose_method(all, layout).method;
+  const GravityMethod method = choose_method(all, heaviest, layout).method;
   GravityLoad load{.own = own.count,
                    .all = all,
                    .ranks = comm_.size(),
+                   .seeks_boxes = seeks_boxes,
                    .opening = gravity::opening_for(parameters_, static_cast<double>(all))};
   for (std::size_t k = 0; k < layout.boxes.size(); ++k) {
     load.boxes.push_back({layout.count[k + 1], gravity::MeshGeometry(layout.boxes[k], layout.cell).size});
   }
   bodies_.forget();  // they are counted
+  census_.forget();
   cuda::require_memory(bytes_for_gravity<Real>(method, load), "gravity beside the particles", comm_);
 }
 
@@ -88,11 +102,11 @@ void CudaGravity<Real>::evaluate_and_hold(double time) {
   stats_.phases.time(Phase::kExchange, [&] { bodies_.gather(own); });
   stats_.bytes_sent = bodies_.bytes_sent();
   const Extremes extremes = bodies_.extremes();
-  const double mass_unit = extremes.of[6] > 0.0 ? extremes.of[6] : 1.0;
+  const double mass_unit = mass_unit_of(extremes);
 
   acceleration_.reserve(3 * std::size_t{own.count});
   gravity::Layout layout;
-  const gravity::MethodChoice choice = choose_method(bodies_.all().count, layout);
+  const gravity::MethodChoice choice = choose_method(bodies_.all().count, mass_unit, layout);
   if (layout.spacing > 0.0) parameters_.mesh.particle_spacing = layout.spacing;
   stats_.method = choice.method;
   stats_.reason = choice.reason;

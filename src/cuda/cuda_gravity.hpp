@@ -6,6 +6,7 @@
 
 #include "cuda/body_sets.hpp"
 #include "cuda/box_gravity.hpp"
+#include "cuda/device_census.hpp"
 #include "cuda/gravity_bodies.hpp"
 #include "cuda/unsplit_gravity.hpp"
 #include "gravity/mesh/layout.hpp"
@@ -19,7 +20,7 @@ class CudaGravity final : public gravity::ResidentSolver {
   using Particles = std::function<PredictArguments<Real>(double time)>;
 
   CudaGravity(GravityMethod method, const gravity::Parameters& parameters, Particles particles, const mpi::Comm& comm,
-              cudaStream_t stream, int threads);
+              cudaStream_t stream);
 
   /// Throws UsageError on all ranks if the device has not the memory that an evaluation takes with the particles where
   /// they are. Collective.
@@ -28,10 +29,11 @@ class CudaGravity final : public gravity::ResidentSolver {
   [[nodiscard]] const gravity::Stats& last() const override { return stats_; }
 
  private:
-  [[nodiscard]] gravity::Layout lay_boxes();
+  [[nodiscard]] gravity::Layout lay_boxes(double heaviest);
   [[nodiscard]] bool needs_boxes(std::uint64_t particles) const;
   // The method to use for so many particles of all ranks; lays boxes where that or the choice needs them.
-  [[nodiscard]] gravity::MethodChoice choose_method(std::uint64_t particles, gravity::Layout& layout);
+  // None is heavier than `heaviest` [kg].
+  [[nodiscard]] gravity::MethodChoice choose_method(std::uint64_t particles, double heaviest, gravity::Layout& layout);
   void sum_directly(double mass_unit);
   void sum_unsplit(std::span<const BodyArrays> sets, const Extremes& extremes, double mass_unit);
   void sum_by_mesh(const gravity::Layout& layout, const Extremes& extremes, double mass_unit);
@@ -42,9 +44,9 @@ class CudaGravity final : public gravity::ResidentSolver {
   Particles particles_;
   mpi::Comm comm_;
   cudaStream_t stream_;
-  int threads_;  // of the host
   gravity::Stats stats_;
   GravityBodies<Real> bodies_;
+  DeviceCensus census_;
   BodySets sets_;
   std::vector<std::unique_ptr<BoxGravity<Real>>> boxes_;  // those that there ever were
   UnsplitGravity<Real> unsplit_;

@@ -31,10 +31,14 @@ std::uint64_t gravity_bytes(const DevicePlan& plan) {
           ? plan.gravity
           : cheapest_on_device(plan.matter, plan.parameters, kDeviceRates<Real>, plan.ranks).method;
   const std::uint64_t all = plan.matter.particles;
+  const bool seeks_boxes = plan.gravity == GravityMethod::kTreePm ||
+                           (plan.gravity == GravityMethod::kAuto &&
+                            choice_needs_boxes(all, plan.parameters, kDeviceRates<Real>, plan.ranks));
   const auto ranks = static_cast<std::uint64_t>(plan.ranks);
   return bytes_for_gravity<Real>(method, {.own = (all + ranks - 1) / ranks,
                                           .all = all,
                                           .ranks = plan.ranks,
+                                          .seeks_boxes = seeks_boxes,
                                           .opening = gravity::opening_for(plan.parameters, static_cast<double>(all)),
                                           .boxes = plan.boxes});
 }

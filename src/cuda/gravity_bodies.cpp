@@ -72,14 +72,10 @@ BodyArrays GravityBodies<Real>::all() const {
 }
 
 template <class Real>
-HostBodies GravityBodies<Real>::own_on_host() const {
-  const std::size_t n = own_;
-  const std::vector<double> values = predicted_.download(4 * n, stream_);
-  HostBodies bodies;
-  bodies.position.reserve(n);
-  for (std::size_t i = 0; i < n; ++i) bodies.position.push_back({values[i], values[n + i], values[2 * n + i]});
-  bodies.mass.assign(values.begin() + static_cast<std::ptrdiff_t>(3 * n), values.end());
-  return bodies;
+BodyArrays GravityBodies<Real>::own_bodies() const {
+  const double* values = predicted_.data();
+  const std::size_t stride = own_;
+  return {{values, values + stride, values + 2 * stride}, values + 3 * stride, own_};
 }
 
 template <class Real>

@@ -1,19 +1,11 @@
 // The point masses of all ranks in the memory of each device.
 #pragma once
 
-#include <vector>
-
 #include "cuda/device_array.hpp"
 #include "cuda/gravity_kernels.hpp"
 #include "mpi/comm.hpp"
 
 namespace breccia::cuda {
-
-/// Point masses in the memory of the host [m, kg].
-struct HostBodies {
-  std::vector<Vec3d> position;
-  std::vector<double> mass;
-};
 
 template <class Real>
 class GravityBodies {
@@ -32,8 +24,8 @@ class GravityBodies {
   [[nodiscard]] unsigned first() const { return first_; }
   [[nodiscard]] unsigned own() const { return own_; }
   [[nodiscard]] double bytes_sent() const { return bytes_sent_; }
-  /// This rank's. The host waits.
-  [[nodiscard]] HostBodies own_on_host() const;
+  /// This rank's.
+  [[nodiscard]] BodyArrays own_bodies() const;
   /// Of all ranks. The host waits.
   [[nodiscard]] Extremes extremes();
 

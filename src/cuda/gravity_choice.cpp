@@ -53,9 +53,9 @@ GravitySeconds gravity_seconds(const Matter& matter, const Parameters& parameter
   seconds.direct = all * all / (ranks * rates.direct_pairs);
   seconds.tree = tree_seconds(all, all / ranks, opening, rates);
   const bool needs_tree = matter.in_boxes < matter.particles || matter.bodies.size() > 1;
-  seconds.mesh = all / (ranks * rates.host_bodies) + static_cast<double>(matter.bodies.size()) * rates.box_seconds +
-                 boxed / rates.tree_bodies + boxed * kNearPairs / (ranks * rates.tree_pairs) +
-                 matter.mesh_nodes / (ranks * rates.mesh_nodes) +
+  seconds.mesh = rates.lay_seconds + all / (ranks * rates.block_bodies) +
+                 static_cast<double>(matter.bodies.size()) * rates.box_seconds + boxed / rates.tree_bodies +
+                 boxed * kNearPairs / (ranks * rates.tree_pairs) + matter.mesh_nodes / (ranks * rates.mesh_nodes) +
                  (needs_tree ? tree_seconds(all, (all - boxed) / ranks, opening, rates) : 0.0);
   return seconds;
 }

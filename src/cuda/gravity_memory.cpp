@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "cuda/device_census.hpp"
 #include "cuda/direct_gravity.hpp"
 #include "cuda/mesh_kernels.hpp"
 #include "cuda/tree_kernels.hpp"
@@ -86,12 +87,24 @@ std::uint64_t direct_bytes(const GravityLoad& load) {
   return with_room(3.0 * sizeof(double) * static_cast<double>(load.own) * slices);
 }
 
-// Positions and masses of all, accelerations of this rank's, what thread blocks find, counters.
+// Dense blocks are few where particles are many (gravity/mesh/boxes.cpp); each is listed with up to 26 around it, of
+// which seldom more than four hold particles that no other one has listed. Ranks list blocks with few of theirs.
+std::uint64_t census_bytes(const GravityLoad& load) {
+  constexpr double most_blocks = 12'000;
+  constexpr double contents = 5.0;
+  const double blocks = std::min(static_cast<double>(load.own) / (load.ranks > 1 ? 4.0 : 24.0), most_blocks);
+  constexpr double block = sizeof(CountedBlock) + sizeof(gravity::BlockIndex) +
+                           (1 + gravity::kBlocksAround) * sizeof(unsigned) + contents * sizeof(BlockSums);
+  return with_room(static_cast<double>(3 * sizeof(unsigned) * table_slots(load.own)) + blocks * block);
+}
+
+// Positions and masses of all, accelerations of this rank's, what thread blocks find, counters, blocks of space.
 std::uint64_t common_bytes(const GravityLoad& load) {
   const auto own = static_cast<double>(load.own);
   const auto all = load.ranks > 1 ? static_cast<double>(load.all) : 0.0;
   constexpr double found = kMostReducers * (sizeof(Extremes) + sizeof(NetForce)) + 4096.0;
-  return with_room(own * (kBodyBytes + 3 * sizeof(double)) + all * kBodyBytes + found);
+  return with_room(own * (kBodyBytes + 3 * sizeof(double)) + all * kBodyBytes + found) +
+         (load.seeks_boxes ? census_bytes(load) : 0);
 }
 
 }  // namespace

@@ -21,6 +21,7 @@ struct GravityLoad {
   std::uint64_t own = 0;  ///< particles of this rank
   std::uint64_t all = 0;  ///< of all ranks, whose positions every device holds
   int ranks = 1;
+  bool seeks_boxes = false;      ///< as the particle mesh does, and `auto` where the choice needs it
   double opening = 1.2e-4;       ///< gravity::opening_for()
   std::vector<BoxLoad> boxes{};  ///< of the particle mesh
 };

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "cuda/launchers.hpp"
 
@@ -34,6 +35,10 @@ std::vector<std::vector<grid::BlockKey>> offers(std::span<const grid::BlockKey> 
 }  // namespace
 
 template <class Real>
+Halo<Real>::Halo(DeviceMessages wanted, const mpi::Comm& comm)
+    : messages_(make_halo_messages(choose_messages(wanted, comm).way, kBlockValues * sizeof(Real), comm)) {}
+
+template <class Real>
 void Halo<Real>::set(std::span<const grid::BlockKey> blocks, unsigned tiles, const grid::Periodicity& periodicity,
                      const mpi::Slabs& slabs, const mpi::Comm& comm, cudaStream_t stream) {
   std::unordered_map<grid::BlockKey, unsigned> index;
@@ -59,8 +64,9 @@ void Halo<Real>::set(std::span<const grid::BlockKey> blocks, unsigned tiles, con
   list_contributions(blocks.size(), comm.rank(), stream);
   sent_.reserve(shared_ * kBlockValues);
   received_.reserve(shared_ * kBlockValues);
-  sent_host_.reserve(shared_ * kBlockValues);
-  received_host_.reserve(shared_ * kBlockValues);
+  std::vector<HaloPart> parts;
+  for (const Peer& peer : peers_) parts.push_back({peer.rank, peer.blocks.size()});
+  messages_->set(std::move(parts), sent_.data(), received_.data());
 }
 
 template <class Real>
@@ -119,35 +125,17 @@ void Halo<Real>::part_tiles(std::span<const grid::BlockKey> blocks, unsigned til
 
 template <class Real>
 void Halo<Real>::send(const GridView<Real>& grid, cudaStream_t stream) {
+  // The boundary of this step came after the nodes of the last one: nobody reads what that step received any more.
   scattered_.record(stream);
   scattered_.precede(stream_);
   launch_collect_shared(grid, sent_blocks_.data(), static_cast<unsigned>(shared_), sent_.data(), stream_);
-  if (!direct_) {
-    check(cudaMemcpyAsync(sent_host_.data(), sent_.data(), bytes(), cudaMemcpyDeviceToHost, stream_), "halo");
-  }
-  ready_.record(stream_);
+  messages_->start(stream_);
 }
 
 template <class Real>
-void Halo<Real>::receive(const mpi::Comm& comm, cudaStream_t stream) {
+void Halo<Real>::receive(cudaStream_t stream) {
   if (!active()) return;
-  // The boundary of this step came after the nodes of the last one: nobody reads what that step received any more.
-  ready_.wait();
-  const Real* from = direct_ ? sent_.data() : sent_host_.data();
-  Real* to = direct_ ? received_.data() : received_host_.data();
-  std::vector<MPI_Request> requests;
-  for (const Peer& peer : peers_) {
-    const std::size_t values = peer.blocks.size() * kBlockValues;
-    requests.emplace_back();
-    MPI_Irecv(to, static_cast<int>(values), mpi::datatype<Real>(), peer.rank, 2, comm.handle(), &requests.back());
-    requests.emplace_back();
-    MPI_Isend(from, static_cast<int>(values), mpi::datatype<Real>(), peer.rank, 2, comm.handle(), &requests.back());
-    from += values;
-    to += values;
-  }
-  MPI_Waitall(static_cast<int>(requests.size()), requests.data(), MPI_STATUSES_IGNORE);
-  if (direct_) return;
-  check(cudaMemcpyAsync(received_.data(), received_host_.data(), bytes(), cudaMemcpyHostToDevice, stream_), "halo");
+  messages_->finish(stream_);
   arrived_.record(stream_);
   arrived_.precede(stream);
 }

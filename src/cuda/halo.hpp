@@ -3,10 +3,11 @@
 // on a stream of their own while the tiles that no other rank waits for are at work.
 #pragma once
 
+#include <memory>
 #include <vector>
 
 #include "cuda/device_array.hpp"
-#include "cuda/device_mpi.hpp"
+#include "cuda/halo_messages.hpp"
 #include "cuda/step_arguments.hpp"
 #include "cuda/stream.hpp"
 #include "mpi/comm.hpp"
@@ -17,6 +18,8 @@ namespace breccia::cuda {
 template <class Real>
 class Halo {
  public:
+  /// By the way that `wanted` comes to (choose_messages). Collective. Throws UsageError if it cannot be.
+  Halo(DeviceMessages wanted, const mpi::Comm& comm);
   /// `blocks`: keys of this rank's blocks, in their order, the first `tiles` of them with a tile. Collective.
   void set(std::span<const grid::BlockKey> blocks, unsigned tiles, const grid::Periodicity& periodicity,
            const mpi::Slabs& slabs, const mpi::Comm& comm, cudaStream_t stream);
@@ -27,10 +30,11 @@ class Halo {
   [[nodiscard]] TileList interior() const { return {interior_.data(), interior_count_}; }
   /// Once `stream` has done what it has, the boundary's scatter, sums start on their way.
   void send(const GridView<Real>& grid, cudaStream_t stream);
-  /// Ends what send() began: what `stream` does next finds the sums of other ranks. The host waits once, for the sums
-  /// of the boundary: MPI knows nothing of streams. By way of pinned memory, unless MPI reads that of the device.
-  /// Collective.
-  void receive(const mpi::Comm& comm, cudaStream_t stream);
+  /// Ends what send() began: what `stream` does next finds the sums of other ranks. With MPI the host waits once, for
+  /// the sums of the boundary; with NCCL it does not. Collective.
+  void receive(cudaStream_t stream);
+  /// To be called before the host waits for `stream`. Throws IoError if messages are known to be lost.
+  void watch(cudaStream_t stream) const { messages_->watch(stream); }
   [[nodiscard]] SharedView<Real> view() const;
   /// Sent in one step.
   [[nodiscard]] std::size_t bytes() const { return shared_ * kBlockValues * sizeof(Real); }
@@ -49,12 +53,11 @@ class Halo {
   std::size_t shared_ = 0;  // blocks of all peers
   DeviceArray<unsigned> sent_blocks_, list_of_block_, first_, lower_, places_;
   DeviceArray<Real> sent_, received_;
-  PinnedArray<Real> sent_host_, received_host_;
   DeviceArray<unsigned> boundary_, interior_;
   unsigned boundary_count_ = 0, interior_count_ = 0;
-  bool direct_ = mpi_takes_device_memory();
-  Stream stream_;
-  Event scattered_, ready_, arrived_;
+  Stream stream_{Stream::Priority::kHigh};  // or its kernels would come behind the interior
+  Event scattered_, arrived_;
+  std::unique_ptr<HaloMessages> messages_;  // last: it ends before the memory that it sends from
 };
 
 extern template class Halo<float>;

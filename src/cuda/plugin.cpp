@@ -4,6 +4,7 @@
 #include "cuda/cuda_engine.hpp"
 #include "cuda/device_memory.hpp"
 #include "cuda/device_plan.hpp"
+#include "cuda/halo_messages.hpp"
 #include "cuda/plugin_interface.hpp"
 
 namespace breccia::cuda {
@@ -26,12 +27,17 @@ const char* select_device(int local_rank, std::string& name) {
   return nullptr;
 }
 
+std::string describe_messages(DeviceMessages wanted, const mpi::Comm& comm) {
+  return choose_messages(wanted, comm).description;
+}
+
 grid::Engine* make_engine(const grid::EngineSetup& setup, const mpi::Comm& comm) {
   if (setup.numerics.precision == Precision::kDouble) return new CudaEngine<DoublePrecision>(setup, comm);
   return new CudaEngine<MixedPrecision>(setup, comm);
 }
 
-constexpr PluginInterface kInterface{BRECCIA_VERSION, &select_device, &ranks_on_device, &memory_of, &make_engine};
+constexpr PluginInterface kInterface{BRECCIA_VERSION,    &select_device, &ranks_on_device,
+                                     &describe_messages, &memory_of,     &make_engine};
 
 }  // namespace
 }  // namespace breccia::cuda

@@ -18,6 +18,9 @@ struct PluginInterface {
   const char* (*select_device)(int local_rank, std::string& name);
   /// How many ranks use the selected device. Collective.
   int (*ranks_on_device)(const mpi::Comm& comm);
+  /// How `wanted` lets devices of several ranks exchange sums, in words; empty on one rank. Collective. Throws
+  /// UsageError if it cannot be.
+  std::string (*describe_messages)(DeviceMessages wanted, const mpi::Comm& comm);
   /// What a run will take of a device (device_plan.hpp). Needs none.
   DeviceMemory (*memory_of)(const DevicePlan& plan);
   /// On the selected device; for the caller to delete.

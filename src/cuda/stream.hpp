@@ -7,7 +7,16 @@ namespace breccia::cuda {
 
 class Stream {
  public:
-  Stream() { check(cudaStreamCreateWithFlags(&stream_, cudaStreamNonBlocking), "stream"); }
+  enum class Priority { kNormal, kHigh };
+
+  /// Thread blocks of a stream of high priority take the next free multiprocessor, before those that wait already.
+  explicit Stream(Priority priority = Priority::kNormal) {
+    int lowest = 0;
+    int highest = 0;
+    check(cudaDeviceGetStreamPriorityRange(&lowest, &highest), "stream");
+    check(cudaStreamCreateWithPriority(&stream_, cudaStreamNonBlocking, priority == Priority::kHigh ? highest : lowest),
+          "stream");
+  }
   ~Stream() { (void)cudaStreamDestroy(stream_); }
   Stream(const Stream&) = delete;
   Stream& operator=(const Stream&) = delete;

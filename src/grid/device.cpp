@@ -78,15 +78,18 @@ std::unique_ptr<Engine> make_cuda_engine(const EngineSetup& setup, const mpi::Co
 
 }  // namespace
 
-EngineChoice choose_engine(Device wanted, const mpi::Comm& comm) {
-  if (wanted == Device::kHost) return {&make_host_engine, "host", "", ""};
+EngineChoice choose_engine(Device wanted, const mpi::Comm& comm, DeviceMessages messages) {
+  if (wanted == Device::kHost) return {&make_host_engine, "host", "", "", ""};
   auto [name, why_not] = select(rank_on_node(comm));
-  if (!comm.any(!why_not.empty())) return {&make_cuda_engine, "cuda", warning_of_sharing(comm), name};
+  if (!comm.any(!why_not.empty())) {
+    return {&make_cuda_engine, "cuda", warning_of_sharing(comm), name,
+            plugin().interface->describe_messages(messages, comm)};
+  }
   if (why_not.empty()) why_not = "other ranks have no CUDA device";
   if (wanted == Device::kCuda) {
     throw UsageError("--device cuda: " + why_not + "; use --device host or auto");
   }
-  return {&make_host_engine, "host", "", plugin().in_this_build ? why_not : ""};
+  return {&make_host_engine, "host", "", plugin().in_this_build ? why_not : "", ""};
 }
 
 bool device_memory(const cuda::DevicePlan& plan, cuda::DeviceMemory& memory) {

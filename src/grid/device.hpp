@@ -20,11 +20,12 @@ struct EngineChoice {
   std::string device;   ///< "host" or "cuda"
   std::string warning;  ///< to be printed; the same on all ranks
   std::string reason;   ///< of a device: its name; of the host: why no CUDA device, empty where none was to be expected
+  std::string messages;  ///< what carries sums between the devices of several ranks; empty where there are none
 };
 
 /// The engine to use, the same on all ranks: that of this node's CUDA devices, if every rank can have one, for kAuto
-/// and kCuda. Collective. Throws UsageError if kCuda cannot be had.
-EngineChoice choose_engine(Device wanted, const mpi::Comm& comm);
+/// and kCuda. Collective. Throws UsageError if kCuda cannot be had, or on devices `messages`.
+EngineChoice choose_engine(Device wanted, const mpi::Comm& comm, DeviceMessages messages = DeviceMessages::kMpi);
 
 /// What a run will take of CUDA devices (cuda/device_plan.hpp), whether there are any or not. False: this build has no
 /// CUDA engine that could tell.

@@ -30,7 +30,8 @@ struct EngineSetup {
   NumericsParameters numerics;
   int threads = 1;
   std::optional<int> slab_axis;  ///< the grid is cut along it; none: along the longest extent of the matter
-  bool divide_blocks = true;     ///< cuts may run through blocks, where the engine can do with that
+  DeviceMessages device_messages = DeviceMessages::kMpi;
+  bool divide_blocks = true;  ///< cuts may run through blocks, where the engine can do with that
 };
 
 /// What tells how a particle is.

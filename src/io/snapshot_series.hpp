@@ -12,9 +12,9 @@ namespace breccia::io {
 /// "snap_0007.hdf": at least four digits.
 std::string snapshot_name(std::uint64_t number);
 
-/// Enters snapshot `number` at `time` [s] into run.hdf.series in `folder` as the last one. A list that is gone or, which
-/// a warning tells, damaged is made anew from the snapshots. The file is replaced in one go. Collective. Throws IoError,
-/// the same on all ranks.
+/// Enters snapshot `number` at `time` [s] into run.hdf.series in `folder` as the last one. A list that is gone or,
+/// which a warning tells, damaged is made anew from the snapshots. The file is replaced in one go. Collective. Throws
+/// IoError, the same on all ranks.
 void add_to_series(const std::filesystem::path& folder, std::uint64_t number, double time, const mpi::Comm& comm);
 
 /// Takes snapshots with this and later numbers off the list. Collective; otherwise as add_to_series.

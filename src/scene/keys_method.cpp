@@ -240,6 +240,17 @@ std::vector<Key> parallel() {
              [&axis] { return std::optional(static_cast<std::size_t>(axis.value_or(3))); },
              [&axis](std::size_t i) { axis = i < 3 ? std::optional(static_cast<int>(i)) : std::nullopt; }};
        }},
+      {"parallel.device_messages",
+       kPure,
+       kAny,
+       {"mpi", "nccl", "auto"},
+       "",
+       "",
+       "what carries sums between the CUDA devices of several ranks in every step: MPI, for which the host waits; "
+       "NCCL, "
+       "which needs libnccl.so.2 and a device for each rank, and has not run on hardware here (docs/gpu.md); or (auto) "
+       "NCCL where both are there. The host engine does not look at it",
+       [](Draft& d, std::size_t) { return choice(d.scene.parallel.device_messages); }},
   };
 }
 

@@ -33,16 +33,22 @@ struct Orbit {
 };
 
 // Integral of dr/|v_r|. The substitution r = middle - half cos(psi) removes the square-root singularity of a turning
-// point at either end; the midpoint rule then converges quickly.
-double time_between(const Orbit& orbit, double r1, double r0) {
+// point at either end; the midpoint rule then converges quickly. v_r^2 is that at contact plus a difference without
+// cancellation, so that an encounter a hair long has its time as well.
+double time_between(const Orbit& orbit, double r1, double r0, double radial_at_contact) {
   constexpr int kSteps = 4096;
-  const double middle = 0.5 * (r0 + r1);
+  const double h = orbit.angular_momentum;
   const double half = 0.5 * (r0 - r1);
   double time = 0.0;
   for (int i = 0; i < kSteps; ++i) {
     const double psi = kPi * (i + 0.5) / kSteps;
-    const double speed = std::sqrt(std::max(orbit.radial_speed_squared(middle - half * std::cos(psi)), 0.0));
-    time += std::sin(psi) / speed;
+    const double sine = std::sin(0.5 * psi);
+    const double way = 2.0 * half * sine * sine;  // r - r1
+    const double r = r1 + way;
+    const double gained = way / (r * r1) * (h * h * (r + r1) / (r * r1) - 2.0 * orbit.mu);
+    const double squared = radial_at_contact * radial_at_contact + gained;
+    // Rounding may put the start beyond the apocentre, where no time is spent.
+    if (squared > 0.0) time += std::sin(psi) / std::sqrt(squared);
   }
   return time * half * kPi / kSteps;
 }
@@ -82,7 +88,8 @@ ImpactOrbit back_calculate(const ImpactParameters& impact, double contact_distan
   const double phi = orbit.true_anomaly(r0, radial) - orbit.true_anomaly(r1, radial_at_contact);
   const Vec3d outward{std::cos(phi), std::sin(phi), 0.0};
   const Vec3d sideways{-outward.y, outward.x, 0.0};
-  return {r0 * outward, radial * outward + transverse * sideways, r0 > r1 ? time_between(orbit, r1, r0) : 0.0};
+  return {r0 * outward, radial * outward + transverse * sideways,
+          r0 > r1 ? time_between(orbit, r1, r0, radial_at_contact) : 0.0};
 }
 
 double equal_volume_radius(const BodyParameters& body, double density) {

@@ -8,8 +8,8 @@
 
 #include "breccia/error.hpp"
 #include "grid/setup_choices.hpp"
-#include "sim/suspects.hpp"
 #include "sim/compensated_sums.hpp"
+#include "sim/suspects.hpp"
 
 namespace breccia::sim {
 namespace {

@@ -12,9 +12,9 @@ namespace breccia::sim {
 
 /// What earlier runs left in an output folder.
 struct OldResults {
-  bool any = false;        ///< a run began there
-  bool ended = false;      ///< and came to its end, as its summary.json says:
-  double reached = 0.0;    ///< simulated time, with half a step more [s]
+  bool any = false;      ///< a run began there
+  bool ended = false;    ///< and came to its end, as its summary.json says:
+  double reached = 0.0;  ///< simulated time, with half a step more [s]
   std::uint64_t steps = 0;
 };
 

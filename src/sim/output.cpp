@@ -108,7 +108,10 @@ void Output::write_snapshot(const TimeLoop& loop, const ParticleOutput& particle
   header.scene_name = scene_.name;
   header.scene_keys = scene_keys_;
   const std::uint64_t number = snapshot_number_++;
+  const auto start = std::chrono::steady_clock::now();
   io::write_snapshot(folder_ / io::snapshot_name(number), header, particles, scene_.output.fields, comm_);
+  const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  longest_write_ = std::max(longest_write_, seconds);
   io::add_to_series(folder_, number, loop.time(), comm_);
 }
 

@@ -61,6 +61,8 @@ class Output {
   /// As summary.json has them. Collective.
   [[nodiscard]] nlohmann::json remnants(const ParticleOutput& particles) const;
   [[nodiscard]] const io::DiagnosticsRow& last_row() const { return last_row_; }
+  /// Of all snapshots of this program so far [s].
+  [[nodiscard]] double longest_write() const { return longest_write_; }
 
  private:
   bool analysis_due(const TimeLoop& loop);
@@ -80,6 +82,7 @@ class Output {
   std::size_t next_analysis_ = 0;
   std::uint64_t snapshot_number_ = 0;
   bool snapshot_wanted_ = false;
+  double longest_write_ = 0.0;
   io::DiagnosticsRow last_row_;
   std::chrono::steady_clock::time_point start_ = std::chrono::steady_clock::now();
 };

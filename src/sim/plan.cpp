@@ -8,6 +8,7 @@
 #include "breccia/constants.hpp"
 #include "cuda/device_plan.hpp"
 #include "gravity/mesh/boxes.hpp"
+#include "gravity/mesh/geometry.hpp"
 #include "gravity/method.hpp"
 #include "grid/device.hpp"
 #include "scene/bodies.hpp"

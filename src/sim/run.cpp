@@ -62,6 +62,7 @@ void print_device(const grid::EngineChoice& engine, const mpi::Comm& comm) {
   if (!engine.warning.empty()) fmt::print(stderr, "breccia: warning: {}\n", engine.warning);
   if (engine.reason.empty()) return;
   fmt::print("device: {} ({})\n", engine.device, engine.reason);
+  if (!engine.messages.empty()) fmt::print("messages between devices: {}\n", engine.messages);
 }
 
 }  // namespace
@@ -70,7 +71,8 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   RunOptions options = options_in;
   if (options.out.empty()) options.out = default_folder(scene);
   const double end = options.until.value_or(scene.time.end);
-  const grid::EngineChoice engine = grid::choose_engine(device_for(scene, options.device), comm);
+  const grid::EngineChoice engine =
+      grid::choose_engine(device_for(scene, options.device), comm, scene.parallel.device_messages);
   Beginning beginning = begin(scene, options, end, comm);
   if (beginning.finished) return;
   std::optional<Restart>& restart = beginning.restart;

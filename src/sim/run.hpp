@@ -1,6 +1,7 @@
 // Runs a scene from the first particle to the summary.
 #pragma once
 
+#include <chrono>
 #include <cstdint>
 #include <filesystem>
 #include <optional>
@@ -20,7 +21,8 @@ struct RunOptions {
   std::optional<std::uint64_t> steps;  ///< ends after this many steps
   std::string restart;                 ///< "auto" or a checkpoint to continue from; empty: a new run
   std::optional<double> walltime;      ///< ends with a checkpoint before this much wall time is over [s]
-  int threads = 1;                     ///< OpenMP threads of each rank
+  std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();  ///< from when that is counted
+  int threads = 1;                                                                   ///< OpenMP threads of each rank
   grid::Device device = grid::Device::kAuto;
   bool profile = false;               ///< prints the stage timers at the end
   std::filesystem::path timeline;     ///< file for what each rank did when in the last steps; empty: none

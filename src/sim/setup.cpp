@@ -99,6 +99,7 @@ grid::EngineSetup engine_setup(const Scene& scene, const ResolvedEffects& effect
   setup.numerics = scene.numerics;
   setup.threads = threads;
   setup.slab_axis = scene.parallel.axis;
+  setup.device_messages = scene.parallel.device_messages;
   return setup;
 }
 

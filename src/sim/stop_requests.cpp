@@ -18,11 +18,15 @@ constexpr std::array kSignals{SIGUSR1, SIGTERM, SIGINT};
 
 // A handler may touch nothing else.
 volatile std::sig_atomic_t last_signal = 0;
+volatile std::sig_atomic_t interrupted = 0;
 
 void take(int signal) {
-  if (signal == SIGINT && last_signal == SIGINT) {
-    std::signal(SIGINT, SIG_DFL);
-    std::raise(SIGINT);
+  if (signal == SIGINT) {
+    if (interrupted != 0) {
+      std::signal(SIGINT, SIG_DFL);
+      std::raise(SIGINT);
+    }
+    interrupted = 1;
   }
   last_signal = signal;
 }
@@ -40,19 +44,16 @@ bool take_file(const std::filesystem::path& path) {
 
 }  // namespace
 
-StopRequests::StopRequests(const std::filesystem::path& folder, std::optional<double> walltime,
-                           std::chrono::steady_clock::time_point start, const mpi::Comm& comm)
-    : folder_(folder), walltime_(walltime), start_(start), comm_(comm) {
-  last_signal = 0;
+void keep_stop_signals() {
   struct sigaction action {};
   action.sa_handler = take;
   action.sa_flags = SA_RESTART;
   for (const int signal : kSignals) sigaction(signal, &action, nullptr);
 }
 
-StopRequests::~StopRequests() {
-  for (const int signal : kSignals) std::signal(signal, SIG_DFL);
-}
+StopRequests::StopRequests(const std::filesystem::path& folder, std::optional<double> walltime,
+                           std::chrono::steady_clock::time_point start, const mpi::Comm& comm)
+    : folder_(folder), walltime_(walltime), start_(start), comm_(comm) {}
 
 Requests StopRequests::poll(double reserve) {
   std::array<std::int32_t, 2> mine{signal_reason(), 0};

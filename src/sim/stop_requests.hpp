@@ -15,15 +15,16 @@ struct Requests {
   bool snapshot = false;
 };
 
-/// Takes SIGUSR1, SIGTERM and SIGINT while it lives; a second SIGINT ends the program at once.
+/// From here to the end of the program SIGUSR1, SIGTERM and SIGINT do not end it but wait to be polled; in vain, if
+/// nothing is left to be stopped. A second SIGINT ends it at once.
+void keep_stop_signals();
+
+/// What asks the run in `folder` to stop.
 class StopRequests {
  public:
   /// `walltime`: this many seconds after `start` the program must have ended.
   StopRequests(const std::filesystem::path& folder, std::optional<double> walltime,
                std::chrono::steady_clock::time_point start, const mpi::Comm& comm);
-  ~StopRequests();
-  StopRequests(const StopRequests&) = delete;
-  StopRequests& operator=(const StopRequests&) = delete;
 
   /// What any rank was asked for since the last call; files asked with are removed. `reserve`: seconds that stopping
   /// and another window may take. Collective.

@@ -12,8 +12,8 @@
 
 namespace breccia::sim {
 
-/// The ids below `total` that are on no rank, lowest first and a few at most: "3, 17, 18 and 40 others". `ids` are those
-/// of this rank. Collective.
+/// The ids below `total` that are on no rank, lowest first and a few at most: "3, 17, 18 and 40 others". `ids` are
+/// those of this rank. Collective.
 [[nodiscard]] std::string missing_ids(std::span<const std::uint64_t> ids, std::uint64_t total, const mpi::Comm& comm);
 
 /// The lowest id of a particle with a value that is not finite; none if there is no such. Collective.

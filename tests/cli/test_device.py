@@ -9,6 +9,7 @@ from unittest import mock
 from command import CommandTest, breccia
 
 EMULATED = os.environ["BRECCIA_EMULATED_CUDA"]
+NCCL = os.environ["BRECCIA_EMULATED_NCCL"]
 
 
 def devices(library, count=1, memory=2 << 30):
@@ -76,6 +77,44 @@ class Device(CommandTest):
             self.assertNotIn("warning", process.stderr)
             self.assertEqual(process.stdout.count("device: cuda (emulated device (1 of 2)"), 1)
         self.assertEqual((self.summary("two")["device"], self.summary("two")["ranks"]), ("cuda", 2))
+
+    def by_nccl(self, out, library=NCCL, wanted="nccl", ranks=2, **more):
+        """On a device for each rank, with this file for NCCL."""
+        with mock.patch.dict(os.environ, BRECCIA_NCCL_LIBRARY=str(library), **more):
+            wanted = f"parallel.device_messages={wanted}"
+            return self.run_scene(out, "--device", "cuda", "--set", wanted, ranks=ranks, steps=10)
+
+    def test_messages_by_nccl_are_those_by_mpi(self):
+        ways = {"nccl": "NCCL 2.28.9", "auto": "NCCL 2.28.9", "mpi": "MPI, by way of pinned host memory"}
+        rows = []
+        with devices(EMULATED, 2):
+            for wanted, way in ways.items():
+                process = self.by_nccl(wanted, wanted=wanted)
+                self.assertEqual(process.returncode, 0, process.stderr)
+                self.assertEqual(process.stdout.count(f"messages between devices: {way}\n"), 1, process.stdout)
+                row = self.last_row(wanted)
+                rows.append({name: row[name] for name in row if not name.startswith("wall")})
+            self.assertEqual(rows, 3 * rows[:1])
+            self.assertNotIn("messages", self.by_nccl("one", ranks=1).stdout)
+
+    def test_nccl_that_cannot_be(self):
+        missing = self.folder / "libnccl.so.2"
+        words = 'parallel.device_messages = "nccl": ', '; use "mpi" or "auto"'
+        with devices(EMULATED, 2):
+            self.assert_fails(self.by_nccl("a", missing), 2, *words, f"{missing}: cannot open")
+            process = self.by_nccl("b", missing, wanted="auto")
+            self.assertEqual(process.returncode, 0, process.stderr)
+            self.assertIn(f"by way of pinned host memory (no NCCL: {missing}: cannot open", process.stdout)
+        with devices(EMULATED, 1):
+            self.assert_fails(self.by_nccl("a"), 2, *words, "up to 2 ranks share a CUDA device")
+        self.assertFalse((self.folder / "a").exists())
+
+    def test_lost_message_ends_the_run(self):
+        with devices(EMULATED, 2):
+            process = self.by_nccl("a", BRECCIA_NCCL_FAULT="lost", BRECCIA_NCCL_PATIENCE="1")
+        self.assertEqual(process.returncode, 4, process.stderr)
+        self.assertEqual(process.stderr.count("breccia: error: "), 1, process.stderr)
+        self.assertIn("NCCL: messages between ranks: remote process exited", process.stderr)
 
     def test_more_ranks_than_devices(self):
         with devices(EMULATED):

@@ -77,22 +77,29 @@ class Restart(CommandTest):
                 if steps <= 80:
                     self.assert_same_run(whole, parts)
 
-    def start_until_rows(self, out, ranks):
-        """A running process that has written its first row; it would take hours to end."""
+    def start(self, out, ranks, *options):
+        """A running process; it would take hours to end."""
         command = [BRECCIA, "run", self.scene, "--out", self.folder / out, "--restart", "auto", "--set", "scene.end=1e6 s"]
-        command += ["--set", "output.diagnostics=every 0.5 s"]
+        command += ["--set", "output.diagnostics=every 0.5 s", *options]
         if ranks > 1:
             command = [MPIRUN, "-n", str(ranks), *command]
         environment = dict(os.environ, OMPI_MCA_orte_execute_quiet="1")
         process = subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
         self.addCleanup(process.kill)
+        return process
+
+    def wait_for(self, condition):
         deadline = time.monotonic() + 60
-        while time.monotonic() < deadline:
-            path = self.folder / out / "diagnostics.csv"
-            if path.exists() and path.read_text().count("\n") > 1:
-                return process
-            time.sleep(0.01)
-        self.fail("the run does not start")
+        while not condition():
+            self.assertLess(time.monotonic(), deadline, "the run does not start")
+            time.sleep(0.005)
+
+    def start_until_rows(self, out, ranks):
+        """A running process that has written its first row; it would take hours to end."""
+        process = self.start(out, ranks)
+        path = self.folder / out / "diagnostics.csv"
+        self.wait_for(lambda: path.exists() and path.read_text().count("\n") > 1)
+        return process
 
     def test_signals(self):
         for ranks, number in ((1, signal.SIGUSR1), (2, signal.SIGUSR1), (1, signal.SIGTERM), (1, signal.SIGINT)):
@@ -119,6 +126,35 @@ class Restart(CommandTest):
         process.communicate(timeout=5)
         self.assertEqual(process.returncode, -signal.SIGINT)
         self.assertEqual(checkpoints(self.folder / out), [])
+
+    def test_signals_before_the_first_step_and_after_the_last(self):
+        """From when the folder is there, particles still to be made, until the process has gone; mpirun itself hands them
+        on only while it watches its ranks, and gets one."""
+        self.scene.write_text(self.scene.read_text().replace("particles = 300", "particles = 30000"))
+        for ranks in (1, 2):
+            with self.subTest(ranks=ranks):
+                out = f"impatient{ranks}"
+                process = self.start(out, ranks)
+                self.wait_for((self.folder / out).exists)
+                process.send_signal(signal.SIGUSR1)
+                while ranks == 1 and process.poll() is None:
+                    process.send_signal(signal.SIGUSR1)
+                    time.sleep(0.002)
+                errors = process.communicate(timeout=60)[1]
+                self.assertEqual(process.returncode, STOPPED, errors)
+                self.assertEqual(checkpoints(self.folder / out), ["checkpoint_0000.h5"])
+
+    def test_walltime_counts_what_comes_before_the_first_step(self):
+        start = time.monotonic()
+        process = self.start("slow", 1, "--walltime", "3")
+        self.wait_for((self.folder / "slow").exists)
+        process.send_signal(signal.SIGSTOP)
+        time.sleep(2.0)
+        process.send_signal(signal.SIGCONT)
+        errors = process.communicate(timeout=60)[1]
+        self.assertEqual(process.returncode, STOPPED, errors)
+        # 2 s, the rest of a window, a checkpoint and the end of MPI; counted from the first step it would be 4 s.
+        self.assertLess(time.monotonic() - start, 3.8)
 
     def test_walltime(self):
         start = time.monotonic()

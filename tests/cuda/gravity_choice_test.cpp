@@ -17,7 +17,8 @@ constexpr DeviceRates kRates{.direct_pairs = 1e9,
                              .tree_pairs = 1e9,
                              .tree_bodies = 1e8,
                              .mesh_nodes = 1e8,
-                             .host_bodies = 1e8,
+                             .block_bodies = 1e8,
+                             .lay_seconds = 0.0,
                              .tree_seconds = 0.1,
                              .box_seconds = 0.05};
 
@@ -91,21 +92,24 @@ TEST(GravityChoice, BodiesThatATreeDisturbsGetAMesh) {
 // Boxes are laid only where that can change the choice, and then it is: no matter is cheaper for a mesh than one body.
 TEST(GravityChoice, BoxesAreLaidOnlyWhereTheyCount) {
   DeviceRates slow_mesh = kRates;
-  slow_mesh.host_bodies = 1e4;
+  slow_mesh.lay_seconds = 1.0;
   EXPECT_TRUE(choice_needs_boxes(100'000, {}, kRates, 1));
   EXPECT_FALSE(choice_needs_boxes(10'000, {}, kRates, 1)) << "the direct sum is cheapest";
   EXPECT_FALSE(choice_needs_boxes(100'000, {.error = 1e-5}, kRates, 1)) << "beyond the mesh";
-  EXPECT_FALSE(choice_needs_boxes(100'000, {}, slow_mesh, 1)) << "to find them takes longer than the tree";
+  EXPECT_FALSE(choice_needs_boxes(100'000, {}, slow_mesh, 1)) << "to choose them takes longer than the tree";
   for (const double boxed : {0.2, 0.6, 1.0}) {
     EXPECT_EQ(cheapest_on_device(matter(100'000, boxed), {}, slow_mesh, 1).method, GravityMethod::kTree) << boxed;
   }
 }
 
-// As the constants stand: a scene of the paper is summed directly, millions of particles are not.
+// As the constants stand: a scene of the paper is summed directly, millions of particles are not, and one body of them
+// gets a mesh.
 TEST(GravityChoice, RatesOfADevice) {
   for (const auto& [rates, least] : {std::pair{kDeviceRates<float>, 20'000U}, {kDeviceRates<double>, 10'000U}}) {
     EXPECT_EQ(cheapest_on_device({.particles = least}, {}, rates, 1).method, GravityMethod::kDirect);
     EXPECT_EQ(cheapest_on_device({.particles = 1'000'000}, {}, rates, 1).method, GravityMethod::kTree);
+    EXPECT_TRUE(choice_needs_boxes(1'000'000, {}, rates, 1));
+    EXPECT_EQ(cheapest_on_device(matter(1'000'000, 1.0), {}, rates, 1).method, GravityMethod::kTreePm);
   }
 }
 

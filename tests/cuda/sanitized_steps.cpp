@@ -9,6 +9,7 @@
 #include "cuda/body_sets.hpp"
 #include "cuda/box_gravity.hpp"
 #include "cuda/cuda_engine.hpp"
+#include "cuda/device_census.hpp"
 
 namespace {
 
@@ -37,6 +38,19 @@ ParticleArrays particles(double cell) {
   return p;
 }
 
+// What the choice of boxes asks of the device.
+void count_in_blocks(const cuda::BodyArrays& bodies, const gravity::Box& box, double heaviest, cudaStream_t stream) {
+  cuda::DeviceCensus census(stream);
+  census.take(bodies, heaviest);
+  census.divide(2e3);
+  std::vector<gravity::BlockIndex> dense;
+  for (const gravity::BlockCount& b : census.crowded(8)) dense.push_back(b.index);
+  std::int64_t counted = 0;
+  for (const std::int64_t n : census.counts(dense)) counted += n;
+  std::printf("%zu dense blocks with %lld bodies, %zu around, %g kg in the box\n", dense.size(),
+              static_cast<long long>(counted), census.around(dense).size(), census.sets({&box, 1})[1].mass);
+}
+
 // A box with a mesh has a thousand particles; this one, around the clumps, has what a sanitizer can bear.
 template <class Real>
 void sum_in_box(const ParticleArrays& all) {
@@ -58,8 +72,10 @@ void sum_in_box(const ParticleArrays& all) {
     bodies.upload(values, stream);
     acceleration.fill_bytes(0, stream);
     const double* x = bodies.data();
+    const cuda::BodyArrays arrays{{x, x + n, x + 2 * n}, x + 3 * n, n};
+    count_in_blocks(arrays, box, all.mass[0], stream);
     cuda::BodySets sets(stream);
-    sets.divide({{x, x + n, x + 2 * n}, x + 3 * n, n}, {&box, 1});
+    sets.divide(arrays, {&box, 1});
     cuda::BoxGravity<Real> gravity(mpi::Comm(MPI_COMM_SELF), stream);
     gravity::Stats stats;
     gravity.add_field(

@@ -35,10 +35,16 @@ class GpuCheck(unittest.TestCase):
         self.assertTrue(found["emulated"])
         self.assertEqual(found["tests"]["failed"], [])
         self.assertEqual(found["tests"]["passed"], 10)
+        self.assertTrue(found["messages"]["same"])
+        self.assertEqual(found["messages"]["nccl"]["way"], "NCCL 2.28.9")
+        self.assertIn("MPI", found["messages"]["mpi"]["way"])
         self.assertEqual({rate["precision"] for rate in found["rates"]}, {"mixed", "double"})
         for rate in found["rates"]:
             self.assertGreater(rate["device"], 0)
             self.assertGreater(rate["host"], 0)
+        (gravity,) = found["gravity"]
+        self.assertEqual((gravity["chosen"], gravity["particles"]), ("direct", 1200))
+        self.assertLess(gravity["rms"], 1e-5)
         self.assertIn("emulated", process.stdout)
 
     def test_build_that_is_not_there(self):

@@ -11,6 +11,7 @@
 #include "gravity/mesh/boxes.hpp"
 #include "gravity/mesh/clusters.hpp"
 #include "gravity/mesh/convolution.hpp"
+#include "gravity/mesh/host_census.hpp"
 #include "gravity/mesh/split.hpp"
 #include "plain_sum.hpp"
 
@@ -237,12 +238,21 @@ TEST(BlockSieve, CountsCrowdedBlocksLikeAllBlocks) {
   }
 }
 
+std::vector<Box> boxes_of(const Cloud& cloud, double spacing, const mpi::Comm& comm) {
+  HostCensus census({cloud.position, cloud.mass}, 1);
+  return choose_boxes(census, spacing, 1.3 * spacing, comm);
+}
+double dense_spacing_of(const Cloud& cloud, const mpi::Comm& comm) {
+  HostCensus census({cloud.position, cloud.mass}, 1);
+  return dense_spacing(census, comm);
+}
+
 TEST(Boxes, FollowTheDenseBodies) {
   const mpi::Comm self(MPI_COMM_SELF);
   const double radius = 5e4;
   const double spacing = radius * std::cbrt(4.0 / 3.0 * kPi / 4000.0);
   Cloud cloud = spheres(4000, {{0, 0, 0}, {2e6, 1e6, 0}}, radius);
-  std::vector<Box> boxes = choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1);
+  std::vector<Box> boxes = boxes_of(cloud, spacing, self);
   ASSERT_EQ(boxes.size(), 2U);
   for (const Box& b : boxes) {
     EXPECT_LT(b.high.x - b.low.x, 2.01 * radius);
@@ -252,13 +262,13 @@ TEST(Boxes, FollowTheDenseBodies) {
   for (const Vec3d& p : cloud.position) EXPECT_TRUE(boxes[0].contains(p) || boxes[1].contains(p));
   // Close by, one mesh over both is cheaper than two and the tree between them.
   cloud = spheres(4000, {{0, 0, 0}, {1.5e5, 0, 0}}, radius);
-  EXPECT_EQ(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).size(), 1U);
+  EXPECT_EQ(boxes_of(cloud, spacing, self).size(), 1U);
   // Debris is no body, however much of it there is; nor is a body too light or without enough particles.
   cloud = spheres(8000, {{0, 0, 0}}, 4e7);
-  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).empty());
+  EXPECT_TRUE(boxes_of(cloud, spacing, self).empty());
   cloud = spheres(500, {{0, 0, 0}}, 0.5 * radius);
-  EXPECT_TRUE(choose_boxes({cloud.position, cloud.mass}, spacing, 1.3 * spacing, self, 1).empty());
-  EXPECT_TRUE(choose_boxes({}, spacing, 1.3 * spacing, self, 1).empty());
+  EXPECT_TRUE(boxes_of(cloud, spacing, self).empty());
+  EXPECT_TRUE(boxes_of({}, spacing, self).empty());
 }
 
 // Filled to just about what makes a block dense, with most of each on one rank: the others must count what it names.
@@ -276,8 +286,8 @@ TEST(Boxes, AreTheSameHoweverTheParticlesAreDealtOut) {
   }
   for (const double fill : {0.30, 0.36, 0.42, 0.48}) {
     const double wide = spacing * std::cbrt(fill);
-    const auto alone = choose_boxes({cloud.position, cloud.mass}, wide, 1.3 * wide, mpi::Comm(MPI_COMM_SELF), 1);
-    const auto shared = choose_boxes({mine.position, mine.mass}, wide, 1.3 * wide, comm, 1);
+    const auto alone = boxes_of(cloud, wide, mpi::Comm(MPI_COMM_SELF));
+    const auto shared = boxes_of(mine, wide, comm);
     ASSERT_EQ(shared.size(), alone.size()) << "fill " << fill;
     for (std::size_t k = 0; k < alone.size(); ++k) EXPECT_TRUE(same(shared[k], alone[k])) << "fill " << fill;
   }
@@ -288,11 +298,11 @@ TEST(Boxes, SpacingOfTheDenseParticles) {
   Cloud cloud = spheres(20000, {{0, 0, 0}}, 5e4);
   const double spacing = 5e4 * std::cbrt(4.0 / 3.0 * kPi / 20000.0);
   // Surface blocks are part empty and random places uneven.
-  EXPECT_NEAR(dense_spacing({cloud.position, cloud.mass}, self) / spacing, 1.0, 0.12);
+  EXPECT_NEAR(dense_spacing_of(cloud, self) / spacing, 1.0, 0.12);
   std::mt19937_64 random(3);
   add_ball(cloud, 5000, {0, 0, 0}, 4e7, random);
-  EXPECT_NEAR(dense_spacing({cloud.position, cloud.mass}, self) / spacing, 1.0, 0.15);
-  EXPECT_EQ(dense_spacing({}, self), 1.0);
+  EXPECT_NEAR(dense_spacing_of(cloud, self) / spacing, 1.0, 0.15);
+  EXPECT_EQ(dense_spacing_of({}, self), 1.0);
 }
 
 }  // namespace

@@ -310,6 +310,21 @@ TEST(TreePm, LargeMeshesAreSharedByTheRanks) {
   }
 }
 
+// physics.md 8, case 15: what mesh and tree leave is taken off in proportion to |a|, so that its square remains.
+TEST(TreePm, TotalForceIsZero) {
+  const Cloud cloud = two_bodies(2000);
+  Stats stats;
+  const Field field = evaluate(cloud, parameters(2000), round_robin(), 1, &stats);
+  Vec3d force{};
+  double size = 0.0;
+  for (std::size_t i = 0; i < cloud.mass.size(); ++i) {
+    force += cloud.mass[i] * field.acceleration[i];
+    size += cloud.mass[i] * norm(field.acceleration[i]);
+  }
+  EXPECT_GT(stats.momentum_error, 0.0);
+  EXPECT_LT(norm(force) / size, 2.0 * stats.momentum_error * stats.momentum_error + 1e-14);
+}
+
 TEST(TreePm, FewOrCoincidentOrMasslessParticles) {
   const Parameters p = parameters(3000);
   EXPECT_TRUE(evaluate({}, p, round_robin()).potential.empty());

@@ -130,7 +130,14 @@ TEST(Orbit, LimitsAreFinite) {
         back_calculate(impact(std::sqrt(2.0 * kMu * (1.0 / kContact - 1.0 / far)), 0.0, far), kContact, kMu);
     EXPECT_TRUE(std::isfinite(fall.velocity.x + fall.position.x + fall.time_to_contact)) << n;
     const ImpactOrbit near = back_calculate(impact(90.0 + n, 90.0, kContact), kContact, kMu);
-    EXPECT_TRUE(std::isfinite(near.velocity.x + near.position.x)) << n;
+    EXPECT_TRUE(std::isfinite(near.velocity.x + near.position.x + near.time_to_contact)) << n;
+    const ImpactOrbit hair = back_calculate(impact(90.0 + n, 90.0, (1.0 + 1e-15 * n) * kContact), kContact, kMu);
+    EXPECT_TRUE(hair.time_to_contact > 0.0 && std::isfinite(hair.time_to_contact)) << n;
+    const double slow = 1e-3 * n;
+    const double top = 1.0 / (1.0 / kContact - 0.5 * slow * slow / kMu);
+    const ImpactOrbit drop = back_calculate(impact(slow, 0.0, top), kContact, kMu);
+    // A fall from rest by less than 1e-5 of the way: constant acceleration mu/r^2.
+    EXPECT_NEAR(drop.time_to_contact / (slow * kContact * kContact / kMu), 1.0, 1e-3) << n;
   }
 
   const ImpactOrbit grazing = back_calculate(impact(100.0, 90.0), kContact, kMu);

@@ -23,8 +23,8 @@ damage = )" +
 
 // Row 23. Danger: gravity held over a window but predicted for half a step too late or early makes a torque,
 // dL/dt = k s dt L with k = 7.5e-7: s = 15.5 windows of 0.61 s would spin the body up by 1.4 % in 2000 s. Guard:
-// prediction by (m - 1)/2 steps. The drift of L must not depend on the interval beyond 1e-4 per 2000 s; the transfer's
-// own exchange with the spin inside the cells is the same for all and taken off with m = 1.
+// prediction by (m - 1)/2 steps. L may drift by 1e-4 in 2000 s, the bound of physics.md 8, whatever the interval (the
+// transfer's own exchange with the spin inside the cells makes 3.4e-5 of it); half a step, 0.31 s, would be 4.6e-4.
 double spin_up(int interval) {
   const Scene scene = load(sphere("4e-4 rad/s", 0.0, 0.6103515625, interval),
                            {"numerics.precision=double", "effects.strength=false", "effects.damage=false"});
@@ -32,9 +32,7 @@ double spin_up(int interval) {
   return course.last.angular_momentum_z / course.first.angular_momentum_z - 1.0;
 }
 TEST(Quiet, GravityWindowsDoNotSpinUp) {
-  const double without_window = spin_up(1);
-  EXPECT_LT(std::abs(without_window), 1e-3);
-  for (const int interval : {8, 32}) EXPECT_NEAR(spin_up(interval), without_window, 1e-4) << interval;
+  for (const int interval : {1, 8, 32}) EXPECT_LT(std::abs(spin_up(interval)), 1e-4) << interval;
 }
 
 struct Shape {
@@ -121,14 +119,20 @@ Turning turning_of(const ParticleOutput& p) {
   }
   return {momentum / across, std::sqrt(2.0 * along / across)};
 }
-TEST(QuietTorture, TurningRubbleKeepsSpinAndShape) {
-  const Scene scene = load(sphere("4e-4 rad/s", 1.0, 0.6103515625, 32), {"body[0].spacing=\"7 km\""});
+struct TurningBounds {
+  double spin, flattening;  // relative; absolute
+  double energy;            // of the kinetic energy
+  double heat;              // [J/kg]
+};
+void expect_turning(const char* spacing, std::uint64_t settled_after, double until, const TurningBounds& bounds) {
+  const Scene scene =
+      load(sphere("4e-4 rad/s", 1.0, 0.6103515625, 32), {std::string("body[0].spacing=\"") + spacing + "\""});
   std::optional<Budget> budget;
   Turning settled, end;
   Shape before, after;
   io::DiagnosticsRow first, last;
   simulate(scene, [&](const TimeLoop& loop) {
-    const bool start = loop.step() == 16384, stop = loop.time() >= 1e5;
+    const bool start = loop.step() == settled_after, stop = loop.time() >= until;
     if (!start && !stop) return true;
     if (!budget) budget.emplace(loop.solver(), scene, mpi::Comm(MPI_COMM_SELF));
     const ParticleOutput p = loop.engine().observe();
@@ -140,13 +144,17 @@ TEST(QuietTorture, TurningRubbleKeepsSpinAndShape) {
   });
   const double spin = end.spin / settled.spin - 1.0, shape = end.flattening - settled.flattening;
   const double energy = last.energy_residual / first.kinetic_energy;
-  std::printf("turning, 1e5 s: spin %+.2e, c/a %.4f %+.2e, energy %+.2e of kinetic, heat %+.2e J/kg\n", spin,
-              settled.flattening, shape, energy, after.heat - before.heat);
-  EXPECT_LT(std::abs(spin), 0.01);
-  EXPECT_LT(std::abs(shape), 0.005);
-  EXPECT_LT(std::abs(energy), 0.05);
-  EXPECT_NEAR(after.heat, before.heat, 5.0);
+  std::printf("turning, spacing %s, %.0f s: spin %+.2e, c/a %.4f %+.2e, energy %+.2e of kinetic, heat %+.2e J/kg\n",
+              spacing, until, spin, settled.flattening, shape, energy, after.heat - before.heat);
+  EXPECT_LT(std::abs(spin), bounds.spin);
+  EXPECT_LT(std::abs(shape), bounds.flattening);
+  EXPECT_LT(std::abs(energy), bounds.energy);
+  EXPECT_NEAR(after.heat, before.heat, bounds.heat);
 }
+TEST(QuietTorture, TurningRubbleKeepsSpinAndShape) { expect_turning("7 km", 16384, 1e5, {0.01, 0.005, 0.05, 5.0}); }
+
+// A twentieth of it, from 5000 s on, on the coarse lattice: a twentieth of the bounds. Of the heat 0.135 J/kg are due.
+TEST(Quiet, TurningRubbleKeepsSpinAndShape) { expect_turning("12.5 km", 8192, 1e4, {5e-4, 2.5e-4, 2.5e-3, 0.25}); }
 
 }  // namespace
 }  // namespace breccia::sim::test

@@ -98,11 +98,12 @@ gravity = "tree"
   EXPECT_LT(course.drift.energy, 1e-5);
 }
 
-// Row 14 and two bodies in one place. Danger: 1/0 in gravity, and a grid that cannot tell the two apart. Guard:
-// softening, self term 0. They pass through each other's nodes with +-10 m/s: momentum stays zero.
+// Row 14 and two bodies in one place. Danger: 1/0 in gravity, and a grid that cannot tell the two apart. Guard: pairs
+// that coincide are left out where nothing softens them, and the self term. They pass through each other's nodes with
+// +-10 m/s: momentum stays zero.
 TEST_P(Sparse, TwoParticlesInOnePlaceStayFinite) {
   for (const char* gravity : {"direct", "tree", "treepm", "off"}) {
-    for (const double speed : {0.0, 10.0}) {
+    for (const auto& [speed, softening] : {std::pair{0.0, "0 m"}, {10.0, "0 m"}, {10.0, "125 m"}}) {
       const Folder folder;
       ParticleFile pair;
       pair.add({1.0, 2.0, 3.0}, {speed, 0.0, 0.0}, 3e13);
@@ -111,11 +112,12 @@ TEST_P(Sparse, TwoParticlesInOnePlaceStayFinite) {
       const Scene both = scene(folder,
                                "[scene]\nend = \"1e5 s\"\n[grid]\ncell = \"2500 m\"\n[time]\nstep = \"0.122 s\"\n"
                                "[[body]]\nshape = \"particles\"\nfile = \"pair.hdf\"\n[effects]\ngravity = \"" +
-                                   std::string(gravity) + "\"\n");
-      const Course course = follow(both, {.steps = 500});
+                                   std::string(gravity) + "\"\n[gravity]\nsoftening = \"" + softening + "\"\n");
+      const Course course = follow(both, {.steps = 200, .every = 20});
       EXPECT_LT(std::abs(course.last.momentum_x), (is_mixed() ? 1e-6 : 1e-12) * course.first.mass * 10.0)
-          << gravity << " " << speed;
-      EXPECT_LE(course.largest_kinetic, course.first.kinetic_energy * (1.0 + 1e-5)) << gravity << " " << speed;
+          << gravity << " " << speed << " " << softening;
+      EXPECT_LE(course.largest_kinetic, course.first.kinetic_energy * (1.0 + 1e-5))
+          << gravity << " " << speed << " " << softening;
     }
   }
 }

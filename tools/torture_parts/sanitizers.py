@@ -6,8 +6,15 @@ import subprocess
 
 from torture_parts import clang
 
-# The threaded engine: every loop over threads, the sweep with its phases, gravity, and whole runs.
-THREADED = ("test_sim_threads", "test_grid_reference", "test_gravity_tree", "test_gravity_direct")
+# The threaded engine: every loop over threads, the sweep with its phases, gravity of each kind, and whole runs.
+THREADED = (
+    "test_sim_threads",
+    "test_grid_reference",
+    "test_gravity_tree",
+    "test_gravity_direct",
+    "test_gravity_tree_pm",
+    "test_gravity_mesh_parts",
+)
 QUICK_THREADED = ("test_sim_threads",)
 
 

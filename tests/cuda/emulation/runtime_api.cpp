@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
-#include <deque>
 #include <functional>
 #include <map>
 #include <vector>
@@ -17,21 +16,6 @@
 struct EmulatedGraph {
   std::vector<std::function<void()>> work;
   std::uint64_t launches = 0;
-};
-struct EmulatedStream {
-  EmulatedGraph* capturing = nullptr;
-  std::deque<std::function<void()>> waiting;
-  std::uint64_t enqueued = 0;
-  std::uint64_t done = 0;
-
-  void run_until(std::uint64_t count) {
-    while (done < count) {
-      const std::function<void()> work = std::move(waiting.front());
-      waiting.pop_front();
-      ++done;
-      work();
-    }
-  }
 };
 struct EmulatedEvent {
   EmulatedStream* stream = nullptr;  // null: never recorded
@@ -96,6 +80,7 @@ Memory& memory() {
 std::uint64_t launches = 0;
 const Substitutes* substitutes = nullptr;
 std::uint64_t synchronisations = 0;
+std::uint64_t copied_to_host = 0;
 
 int device_of_this = 0;
 std::vector<EmulatedStream*> streams;
@@ -106,20 +91,11 @@ void run_all() {
 
 }  // namespace
 
-// Later, or as a part of the graph that the stream captures.
-void enqueue(cudaStream_t stream, std::function<void()> work) {
-  if (stream->capturing != nullptr) {
-    stream->capturing->work.push_back(std::move(work));
-    return;
-  }
-  stream->waiting.push_back(std::move(work));
-  ++stream->enqueued;
-  const std::size_t early = early_stream(streams.size());
-  if (early < streams.size()) streams[early]->run_until(streams[early]->enqueued);
-}
+void enqueue(cudaStream_t stream, std::function<void()> work) { stream->enqueue(std::move(work)); }
 
 std::uint64_t launch_count() { return launches; }
 std::uint64_t synchronisation_count() { return synchronisations; }
+std::uint64_t bytes_to_host() { return copied_to_host; }
 std::size_t most_bytes() { return memory().most; }
 void forget_most_bytes() { memory().most = memory().used; }
 std::size_t used_bytes() { return memory().used; }
@@ -158,6 +134,27 @@ void launch(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared
 
 }  // namespace breccia::cuda_emulation
 
+void EmulatedStream::enqueue(std::function<void()> work) {
+  using namespace breccia::cuda_emulation;
+  if (capturing != nullptr) {
+    capturing->work.push_back(std::move(work));
+    return;
+  }
+  waiting.push_back(std::move(work));
+  ++enqueued;
+  const std::size_t early = early_stream(streams.size());
+  if (early < streams.size()) streams[early]->run_until(streams[early]->enqueued);
+}
+
+void EmulatedStream::run_until(std::uint64_t count) {
+  while (done < count) {
+    const std::function<void()> work = std::move(waiting.front());
+    waiting.pop_front();
+    ++done;
+    work();
+  }
+}
+
 using breccia::cuda_emulation::EmulationError;
 using breccia::cuda_emulation::memory;
 
@@ -173,6 +170,8 @@ const char* cudaGetErrorString(cudaError_t error) {
       return "CUDA driver version is insufficient for CUDA runtime version";
     case cudaErrorNoDevice:
       return "no CUDA-capable device is detected";
+    case cudaErrorNotReady:
+      return "device not ready";
   }
   return "unknown error";
 }
@@ -250,6 +249,7 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaM
   const bool from_device = kind != cudaMemcpyHostToDevice;
   if (memory().holds(to, bytes) != to_device || memory().holds(from, bytes) != from_device)
     return cudaErrorInvalidValue;
+  if (kind == cudaMemcpyDeviceToHost) breccia::cuda_emulation::copied_to_host += bytes;
   breccia::cuda_emulation::enqueue(stream, [=] { std::memcpy(to, from, bytes); });
   return cudaSuccess;
 }
@@ -275,7 +275,19 @@ cudaError_t cudaStreamCreate(cudaStream_t* stream) {
   breccia::cuda_emulation::streams.push_back(*stream);
   return cudaSuccess;
 }
-cudaError_t cudaStreamCreateWithFlags(cudaStream_t* stream, unsigned) { return cudaStreamCreate(stream); }
+cudaError_t cudaStreamCreateWithPriority(cudaStream_t* stream, unsigned, int) { return cudaStreamCreate(stream); }
+cudaError_t cudaDeviceGetStreamPriorityRange(int* lowest, int* highest) {
+  *lowest = 0;
+  *highest = -5;
+  return cudaSuccess;
+}
+// To ask in a loop is to wait, which is counted, and in which the device gets on.
+cudaError_t cudaStreamQuery(cudaStream_t stream) {
+  if (stream->done == stream->enqueued) return cudaSuccess;
+  ++breccia::cuda_emulation::synchronisations;
+  stream->run_until(stream->done + 1);
+  return cudaErrorNotReady;
+}
 cudaError_t cudaStreamDestroy(cudaStream_t stream) {
   breccia::cuda_emulation::run_all();
   std::erase(breccia::cuda_emulation::streams, stream);

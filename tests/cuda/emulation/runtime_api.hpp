@@ -4,6 +4,9 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
 
 // The names are CUDA's.
 // NOLINTBEGIN(readability-identifier-naming)
@@ -18,12 +21,26 @@ enum cudaError_t {
   cudaErrorMemoryAllocation = 2,
   cudaErrorInsufficientDriver = 35,
   cudaErrorNoDevice = 100,
+  cudaErrorNotReady = 600,
 };
 enum cudaMemcpyKind { cudaMemcpyHostToDevice = 1, cudaMemcpyDeviceToHost = 2, cudaMemcpyDeviceToDevice = 3 };
 enum cudaFuncAttribute { cudaFuncAttributeMaxDynamicSharedMemorySize = 8 };
 enum cudaStreamCaptureMode { cudaStreamCaptureModeThreadLocal = 1 };
 
-using cudaStream_t = struct EmulatedStream*;
+/// Libraries of others than the engine, like NCCL, reach a stream by this class alone: they are loaded at run time and
+/// see no function of the program's.
+struct EmulatedStream {
+  virtual ~EmulatedStream() = default;
+  /// Later, or as a part of the graph that the stream captures.
+  virtual void enqueue(std::function<void()> work);
+  void run_until(std::uint64_t count);
+
+  struct EmulatedGraph* capturing = nullptr;
+  std::deque<std::function<void()>> waiting;
+  std::uint64_t enqueued = 0;
+  std::uint64_t done = 0;
+};
+using cudaStream_t = EmulatedStream*;
 using cudaEvent_t = struct EmulatedEvent*;
 using cudaGraph_t = struct EmulatedGraph*;
 using cudaGraphExec_t = struct EmulatedGraph*;
@@ -51,7 +68,9 @@ cudaError_t cudaMemcpy2DAsync(void* to, std::size_t to_pitch, const void* from, 
 cudaError_t cudaMemsetAsync(void* to, int value, std::size_t bytes, cudaStream_t stream);
 cudaError_t cudaStreamCreate(cudaStream_t* stream);
 constexpr unsigned cudaStreamNonBlocking = 1;
-cudaError_t cudaStreamCreateWithFlags(cudaStream_t* stream, unsigned flags);
+cudaError_t cudaStreamCreateWithPriority(cudaStream_t* stream, unsigned flags, int priority);
+cudaError_t cudaDeviceGetStreamPriorityRange(int* lowest, int* highest);
+cudaError_t cudaStreamQuery(cudaStream_t stream);
 cudaError_t cudaStreamDestroy(cudaStream_t stream);
 cudaError_t cudaStreamSynchronize(cudaStream_t stream);
 constexpr unsigned cudaEventDisableTiming = 2;
