@@ -70,8 +70,9 @@ TEST(Resolve, ImpactNeedsTwoBodiesThatCanMeet) {
 
 TEST(Resolve, NothingIsFasterThanLight) {
   EXPECT_EQ(usage_error(kSphere + "velocity = [\"0\", \"2.9e8 m/s\", \"0\"]\n"), "");
-  EXPECT_TRUE(contains(usage_error(kSphere + "velocity = [\"0\", \"-1e30 m/s\", \"0\"]\n"),
-                       "body[0].velocity: \"body 1\" would move at 1e+30 m/s, faster than light"));
+  const std::string error = usage_error(kSphere + "velocity = [\"0\", \"-1e30 m/s\", \"0\"]\n");
+  EXPECT_TRUE(contains(error, "body[0].velocity: ")) << error;
+  EXPECT_TRUE(contains(error, "would move at 1e+30 m/s, faster than light")) << error;
   EXPECT_TRUE(contains(usage_error(kSphere + "spin = [\"0\", \"1e5 rad/s\", \"0\"]\n"), "body[0].spin: "));
 }
 
