@@ -114,7 +114,7 @@ bool Checkpoints::due(double time, bool last_window) const {
 std::string Checkpoints::write(const EngineState& engine, const RunState& run) {
   const auto start = Clock::now();
   const std::uint64_t number = next_number_++;
-  const std::string name = io::checkpoint_name(number);
+  std::string name = io::checkpoint_name(number);
   io::write_checkpoint(folder_ / name, {engine, to_text(run)}, comm_);
   io::remove_other_checkpoints(folder_, number, output_.keep, comm_);
   last_time_ = run.loop.time;
