@@ -164,14 +164,16 @@ StateColumn read_column(const h5::File& file, const std::string& name, std::uint
   return column;
 }
 
-void read_engine(const h5::File& file, EngineState& state, const mpi::Comm& comm) {
+std::int64_t known_format(const h5::File& file, const fs::path& path) {
   std::int64_t format = 0;
-  file.read_attribute("/Engine", "Format", format);
-  if (format != kFormat && format != kFormatOfBlockCuts) {
-    throw IoError(
-        fmt::format("format {}, but this program reads {} and {}: to be continued by the program that wrote it", format,
-                    kFormatOfBlockCuts, kFormat));
-  }
+  if (!file.read_attribute("/Engine", "Format", format)) throw IoError("no attribute Format of /Engine");
+  if (format == kFormat || format == kFormatOfBlockCuts) return format;
+  throw UnknownFormat(
+      fmt::format("{}: format {}, but this program reads {} and {}: to be continued by the program that wrote it",
+                  path.string(), format, kFormatOfBlockCuts, kFormat));
+}
+
+void read_engine(const h5::File& file, std::int64_t format, EngineState& state, const mpi::Comm& comm) {
   const std::uint64_t ranks = file.shape("/Engine/ParticlesOfRank").at(0);
   const auto of_rank = file.read_rows<std::uint64_t>("/Engine/ParticlesOfRank", {0, ranks});
   const std::uint64_t total = std::accumulate(of_rank.begin(), of_rank.end(), std::uint64_t{0});
@@ -246,9 +248,11 @@ Checkpoint read_checkpoint(const fs::path& path, const mpi::Comm& comm) {
   Checkpoint checkpoint;
   const h5::File file = h5::File::open(path, comm);
   try {
-    read_engine(file, checkpoint.engine, comm);
+    read_engine(file, known_format(file, path), checkpoint.engine, comm);
     checkpoint.run = file.read_text("/Run");
     require_checksum(file, "/Run", of_root(checkpoint.run, comm), comm);
+  } catch (const UnknownFormat&) {
+    throw;
   } catch (const IoError& error) {
     const std::string what = error.what();
     throw IoError(what.starts_with(path.string()) ? what : fmt::format("{}: {}", path.string(), what));

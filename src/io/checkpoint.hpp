@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "breccia/engine_state.hpp"
+#include "breccia/error.hpp"
 #include "mpi/comm.hpp"
 
 namespace breccia::io {
@@ -14,6 +15,12 @@ namespace breccia::io {
 struct Checkpoint {
   EngineState engine;  ///< of this rank
   std::string run;     ///< everything else, JSON
+};
+
+/// A checkpoint of a format that this program does not read: whole, and of use to the program that wrote it.
+class UnknownFormat : public IoError {
+ public:
+  using IoError::IoError;
 };
 
 /// "checkpoint_0007.h5"
@@ -32,7 +39,8 @@ void remove_other_checkpoints(const std::filesystem::path& folder, std::uint64_t
 void write_checkpoint(const std::filesystem::path& path, const Checkpoint& checkpoint, const mpi::Comm& comm);
 
 /// Reads a checkpoint in which damage_of() found nothing. On as many ranks as wrote it each gets what it had, in its
-/// order; on others the particles are dealt out evenly. Collective. Throws IoError, the same on all ranks.
+/// order; on others the particles are dealt out evenly. Collective. Throws UnknownFormat, IoError, naming the file; the
+/// same on all ranks.
 Checkpoint read_checkpoint(const std::filesystem::path& path, const mpi::Comm& comm);
 
 }  // namespace breccia::io

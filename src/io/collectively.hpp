@@ -3,6 +3,7 @@
 #pragma once
 
 #include <exception>
+#include <filesystem>
 #include <optional>
 #include <utility>
 
@@ -22,6 +23,8 @@ void collectively(const mpi::Comm& comm, Stage&& stage) {
     std::forward<Stage>(stage)();
   } catch (const Error& e) {
     error = e;
+  } catch (const std::filesystem::filesystem_error& e) {
+    error = IoError(e.path1().string() + ": " + e.code().message());
   } catch (const std::exception& e) {
     error = IoError(e.what());
   }

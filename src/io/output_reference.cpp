@@ -25,7 +25,8 @@ attributes `Units` and `Description`. A field whose effect is off is left out.
 {fields}
 `/Header` has the attributes `Time` [s], `Step`, `CellSize` [m], `TargetMass` (heaviest initial body) [kg], `Period` (three
 lengths of the periodic domain, 0 where it is not periodic) [m], `NumberOfParticles`, `Fields`, `SceneName`, `CodeName` and
-`CodeVersion`; `/Parameters/Scene` is the text of the scene file; `/Units` says SI.
+`CodeVersion`; `/Parameters/Scene` has the keys of the scene as resolved that a run may not change while it goes on, as
+JSON; `/Units` says SI.
 
 ## `diagnostics.csv`
 
@@ -44,12 +45,12 @@ newest `output.keep` stay. They are read by the version that wrote them, on any 
 ## `dump.hdf`, `dump.json`
 
 Left by a run that ended with exit code 3, the numbers having gone wrong: all particles as a snapshot, but with the
-velocities of half a step before and without `GridDensity`; and the error with the particle at fault, if there is one,
-before and after the step that broke it.
+velocities of half a step before and without `GridDensity`; and the error with the particle at fault, `particle`, before and
+after the step that broke it, or, if it is none by itself, `fastest_particle`.
 
 ## `summary.json`
 
-Written at the end: `particles`, `steps`, `simulated_time` [s], `time_step` (the last) [s], `wall_seconds`, `ranks`, `threads`, `device`, `precision`,
+Written at the end, removed when a run goes on to a later one: `particles`, `steps`, `simulated_time` [s], `time_step` (the last) [s], `wall_seconds`, `ranks`, `threads`, `device`, `precision`,
 `particle_steps_per_second`; `conservation` with the drifts of `mass` (over the total mass), `momentum` (over sum m |v|),
 `angular_momentum` (over sum m |x cross v|) and `energy` (over max(kinetic + |potential|)); `damaged_fraction`; `clamped_volumes`; `remnants`,
 largest first; `stages` with the wall time of each stage of the step on the first rank, parts of gravity as `gravity: part` and also

@@ -21,7 +21,7 @@ struct SnapshotHeader {
   double target_mass = 0.0;  ///< heaviest initial body [kg]; 0: unknown
   Vec3d period{};            ///< length of the periodic domain along each axis [m]; 0: not periodic
   std::string scene_name;
-  std::string scene_toml;           ///< text of the scene file, in /Parameters/Scene; may be empty
+  std::string scene_keys;           ///< in /Parameters/Scene: JSON, keys of the scene as resolved; may be empty
   std::string code_version;         ///< set by write_snapshot
   std::uint64_t particles = 0;      ///< of all ranks; set by write_snapshot
   std::vector<std::string> fields;  ///< in the file; set by write_snapshot
@@ -39,8 +39,8 @@ struct Snapshot {
 void write_snapshot(const std::filesystem::path& path, const SnapshotHeader& header, const ParticleOutput& particles,
                     std::span<const std::string> wanted_fields, const mpi::Comm& comm);
 
-/// The scene's name in a snapshot; empty if there is none. Not collective. Throws IoError.
-std::string scene_name_in(const std::filesystem::path& path);
+/// What a snapshot says about its run, without reading particles. Not collective. Throws IoError.
+SnapshotHeader read_snapshot_header(const std::filesystem::path& path);
 
 /// Reads a snapshot, or any file with /PartType0/Coordinates (N,3) and /PartType0/Masses (N); each rank gets a
 /// contiguous share of the rows. Missing velocities, bodies, materials and damage are 0, missing ids are row numbers,

@@ -48,7 +48,7 @@ SnapshotHeader read_header(const h5::File& file) {
   };
   header.scene_name = text("SceneName");
   header.code_version = text("CodeVersion");
-  if (file.exists("/Parameters/Scene")) header.scene_toml = file.read_text("/Parameters/Scene");
+  if (file.exists("/Parameters/Scene")) header.scene_keys = file.read_text("/Parameters/Scene");
   return header;
 }
 
@@ -112,10 +112,11 @@ void fill_missing(ParticleOutput& particles, h5::Rows rows) {
 
 }  // namespace
 
-std::string scene_name_in(const std::filesystem::path& path) {
+SnapshotHeader read_snapshot_header(const std::filesystem::path& path) {
   const mpi::Comm self(MPI_COMM_SELF);
+  require_hdf5(path);
   require_harmless(path);
-  return read_header(h5::File::open(path, self)).scene_name;
+  return read_header(h5::File::open(path, self));
 }
 
 Snapshot read_snapshot(const std::filesystem::path& path, const mpi::Comm& comm) {

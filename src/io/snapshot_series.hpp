@@ -12,11 +12,12 @@ namespace breccia::io {
 /// "snap_0007.hdf": at least four digits.
 std::string snapshot_name(std::uint64_t number);
 
-/// Enters snapshot `name` at `time` [s] into run.hdf.series in `folder`, in place of an older entry of that name;
-/// the other entries stay. The file is replaced in one go. Collective. Throws IoError, the same on all ranks.
-void add_to_series(const std::filesystem::path& folder, const std::string& name, double time, const mpi::Comm& comm);
+/// Enters snapshot `number` at `time` [s] into run.hdf.series in `folder` as the last one. A list that is gone or,
+/// which a warning tells, damaged is made anew from the snapshots. The file is replaced in one go. Collective. Throws
+/// IoError, the same on all ranks.
+void add_to_series(const std::filesystem::path& folder, std::uint64_t number, double time, const mpi::Comm& comm);
 
-/// Takes snapshots with this and later numbers off the list. Collective; throws IoError as add_to_series does.
+/// Takes snapshots with this and later numbers off the list. Collective; otherwise as add_to_series.
 void cut_series(const std::filesystem::path& folder, std::uint64_t first_number, const mpi::Comm& comm);
 
 }  // namespace breccia::io

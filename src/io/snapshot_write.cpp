@@ -121,7 +121,7 @@ void write_header(h5::File& file, const SnapshotHeader& header, std::uint64_t to
   file.write_attribute(group, "CodeName", std::string("breccia"));
   file.write_attribute(group, "CodeVersion", std::string(BRECCIA_VERSION));
   file.create_group("/Parameters");
-  if (!header.scene_toml.empty()) file.write_text("/Parameters/Scene", header.scene_toml);
+  if (!header.scene_keys.empty()) file.write_text("/Parameters/Scene", header.scene_keys);
 }
 
 // SI, said in words and in the way SWIFT's readers ask for it.

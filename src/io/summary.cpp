@@ -102,4 +102,8 @@ void write_summary(const std::filesystem::path& path, const RunSummary& summary,
   on_root(comm, [&] { write_file(path, to_json(summary).dump(2) + "\n"); });
 }
 
+void remove_summary(const std::filesystem::path& path, const mpi::Comm& comm) {
+  on_root(comm, [&] { std::filesystem::remove(path); });
+}
+
 }  // namespace breccia::io

@@ -65,5 +65,7 @@ nlohmann::ordered_json to_json(const RunSummary& summary);
 
 /// Writes the root's `summary` as `path`, in full or not at all. Collective. Throws IoError, the same on all ranks.
 void write_summary(const std::filesystem::path& path, const RunSummary& summary, const mpi::Comm& comm);
+/// Removes the summary of an earlier end, if there is one. Collective. Throws IoError, the same on all ranks.
+void remove_summary(const std::filesystem::path& path, const mpi::Comm& comm);
 
 }  // namespace breccia::io

@@ -131,4 +131,20 @@ void check_inside_boundaries(const Scene& scene, const Document& document) {
   }
 }
 
+void check_speeds(const Scene& scene, const Document& document) {
+  constexpr double kLight = 299792458.0;  // [m/s]
+  for (std::size_t i = 0; i < scene.bodies.size(); ++i) {
+    const BodyParameters& body = scene.bodies[i];
+    const double speed = std::sqrt(dot(body.velocity, body.velocity));
+    const double reach = std::max({body.semi_axes.x, body.semi_axes.y, body.semi_axes.z});
+    const double rim = std::sqrt(dot(body.spin, body.spin)) * reach;
+    const auto refuse = [&](const char* key, double value) {
+      fail(document, fmt::format("body[{}].{}", i, key),
+           fmt::format("\"{}\" would move at {:.6g} m/s, faster than light", body.name, value));
+    };
+    if (!(speed < kLight)) refuse("velocity", speed);
+    if (!(rim < kLight)) refuse("spin", rim);
+  }
+}
+
 }  // namespace breccia::scene

@@ -14,4 +14,7 @@ void check_overlap(const Scene& scene, const Document& document, const mpi::Comm
 /// Throws UsageError if an analytic body reaches through a boundary plane by more than a tenth of its particle spacing.
 void check_inside_boundaries(const Scene& scene, const Document& document);
 
+/// Throws UsageError if a body moves or turns faster than light: a slip of the pen, whose numbers would overflow.
+void check_speeds(const Scene& scene, const Document& document);
+
 }  // namespace breccia::scene

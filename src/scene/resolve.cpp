@@ -80,6 +80,7 @@ Scene resolve(Draft& draft, const Document& document, const mpi::Comm* comm) {
   resolve_boundaries(draft, scene, document);
   check_overlap(scene, document, comm);
   check_inside_boundaries(scene, document);
+  check_speeds(scene, document);
   return scene;
 }
 

@@ -33,8 +33,9 @@ class Checkpoints {
   Checkpoints(const std::filesystem::path& folder, const OutputParameters& output, double time,
               std::uint64_t first_number, const mpi::Comm& comm);
 
-  /// True on all ranks if the interval of wall time or of simulated time is over. Collective.
-  [[nodiscard]] bool due(double time) const;
+  /// True on all ranks if the interval of wall time or of simulated time is over, or if the run will end within this
+  /// window, so that a later end costs a window, not the run. Collective.
+  [[nodiscard]] bool due(double time, bool last_window) const;
   /// Writes one and removes those that are too many; returns its name. Collective. Throws IoError.
   std::string write(const EngineState& engine, const RunState& run);
   /// Wall time the last one took [s].

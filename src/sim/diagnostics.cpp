@@ -9,6 +9,7 @@
 #include "breccia/error.hpp"
 #include "grid/setup_choices.hpp"
 #include "sim/compensated_sums.hpp"
+#include "sim/suspects.hpp"
 
 namespace breccia::sim {
 namespace {
@@ -141,19 +142,24 @@ io::DiagnosticsRow Budget::row(const grid::Engine& engine, const ParticleOutput&
     return r.kinetic_energy + r.affine_energy + r.internal_energy + r.gravitational_energy;
   };
   row.energy_residual = total(row) - total(state_.first);
-  require_sums(row);
+  require_sums(row, p);
   follow(row, s[kMomentumScale], s[kAngularScale]);
   require_no_gain(row);
   return row;
 }
 
-void Budget::require_sums(const io::DiagnosticsRow& row) const {
+void Budget::require_sums(const io::DiagnosticsRow& row, const ParticleOutput& p) const {
   if (!std::isfinite(row.kinetic_energy + row.affine_energy + row.internal_energy + row.elastic_energy + row.min_J +
                      row.max_J)) {
-    throw NumericsError("a particle is not finite any more: the run is unstable; try a smaller time.step or time.cfl");
+    const std::optional<std::uint64_t> id = not_finite(p, comm_);
+    throw NumericsError(
+        fmt::format("{} is not finite any more: the run is unstable; try a smaller time.step or time.cfl",
+                    id ? fmt::format("particle {}", *id) : "a particle"));
   }
   if (row.particles != state_.first.particles) {
-    throw NumericsError(fmt::format("{} particles, but {} at the start", row.particles, state_.first.particles));
+    const std::string missing = missing_ids(p.id, state_.first.particles, comm_);
+    throw NumericsError(fmt::format("{} particles, but {} at the start{}{}", row.particles, state_.first.particles,
+                                    missing.empty() ? "" : "; missing are the ids ", missing));
   }
   if (std::abs(row.mass - state_.first.mass) > 1e-12 * state_.first.mass) {
     throw NumericsError(fmt::format("total mass {:.17g} kg, but {:.17g} kg at the start", row.mass, state_.first.mass));

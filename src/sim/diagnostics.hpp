@@ -31,7 +31,7 @@ class Budget {
   void restore(const BudgetState& state) { state_ = state; }
 
  private:
-  void require_sums(const io::DiagnosticsRow& row) const;
+  void require_sums(const io::DiagnosticsRow& row, const ParticleOutput& particles) const;
   void require_no_gain(const io::DiagnosticsRow& row) const;
   void follow(const io::DiagnosticsRow& row, double momentum_scale, double angular_scale);
 

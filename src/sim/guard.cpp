@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "breccia/error.hpp"
+#include "sim/suspects.hpp"
 
 namespace breccia::sim {
 namespace {
@@ -56,7 +57,9 @@ void Guard::check(const grid::Engine& engine) {
         p.id, text_of(p.position), text_of(p.values), kAdvice));
   }
   if (sums[2] != static_cast<double>(particles_)) {
-    throw NumericsError(fmt::format("{} particles are left of {}", sums[2], particles_));
+    const std::string missing = missing_ids(engine.inspect().id, particles_, comm_);
+    throw NumericsError(fmt::format("{} particles are left of {}{}{}", sums[2], particles_,
+                                    missing.empty() ? "" : ", without those of the ids ", missing));
   }
 }
 

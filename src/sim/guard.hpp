@@ -39,10 +39,11 @@ class Guard {
 
   /// After check() has thrown: the particle, if it is known which. The same on all ranks.
   [[nodiscard]] const std::optional<GuardedFault>& fault() const { return fault_; }
+  /// The fastest particle of all ranks, or one that has left the grid around it. Collective.
+  [[nodiscard]] grid::ParticleSample fastest(const grid::Engine& engine) const;
 
  private:
   void share_fault();
-  [[nodiscard]] grid::ParticleSample fastest(const grid::Engine& engine) const;
 
   std::uint64_t particles_ = 0;
   double step_at_rest_;

@@ -25,14 +25,14 @@ Interruptions::Interruptions(const RunOptions& options, const Scene& scene, doub
       requests_(options.out, options.walltime, options.started, comm),
       checkpoints_(options.out, scene.output, time, first_checkpoint, comm) {}
 
-bool Interruptions::at_window_start(const TimeLoop& loop) {
+bool Interruptions::at_window_start(const TimeLoop& loop, bool last_window) {
   const auto now = Clock::now();
   longest_window_ = std::max(longest_window_, std::chrono::duration<double>(now - window_start_).count());
   // The first checkpoint takes longer than a snapshot, which is compressed but has fewer fields.
   const double writing = std::max(checkpoints_.seconds(), 2.0 * output_.longest_write());
   const Requests requests = requests_.poll(kSafety * (longest_window_ + writing) + kSlack);
   if (requests.snapshot) output_.want_snapshot();
-  if (requests.stop != nullptr || checkpoints_.due(loop.time())) {
+  if (requests.stop != nullptr || checkpoints_.due(loop.time(), last_window)) {
     loop.timers()("checkpoint", [&] { write(loop); });
   }
   if (requests.stop != nullptr) {

@@ -20,8 +20,9 @@ class Interruptions {
   Interruptions(const RunOptions& options, const Scene& scene, double time, Output& output, const Budget& budget,
                 double wall_before, std::uint64_t first_checkpoint, const mpi::Comm& comm);
 
-  /// False if the run is to stop; its checkpoint is written then. Collective.
-  bool at_window_start(const TimeLoop& loop);
+  /// False if the run is to stop; its checkpoint is written then. `last_window`: it will end within this window.
+  /// Collective.
+  bool at_window_start(const TimeLoop& loop, bool last_window);
   /// Throws Error with the exit code of a stopped run if the run was stopped.
   void end_if_stopped() const;
 

@@ -10,6 +10,7 @@
 #include "io/remnants_json.hpp"
 #include "io/snapshot.hpp"
 #include "io/snapshot_series.hpp"
+#include "sim/same_scene.hpp"
 
 namespace breccia::sim {
 namespace {
@@ -25,8 +26,10 @@ double target_mass(const Scene& scene) {
 }  // namespace
 
 Output::Output(const Scene& scene, const std::filesystem::path& folder, double end,
-               const std::optional<Restart>& restart, Budget& budget, const mpi::Comm& comm)
+               const std::vector<ResolvedKey>& keys, const std::optional<Restart>& restart, Budget& budget,
+               const mpi::Comm& comm)
     : scene_(scene),
+      scene_keys_(lasting_keys(keys)),
       folder_(folder),
       comm_(comm),
       budget_(budget),
@@ -34,13 +37,14 @@ Output::Output(const Scene& scene, const std::filesystem::path& folder, double e
                            : io::DiagnosticsWriter(folder_ / "diagnostics.csv", comm)),
       snapshots_(scene.output.snapshot_interval),
       rows_(scene.output.diagnostics_interval > 0.0 ? scene.output.diagnostics_interval : end / kDefaultRows) {
-  if (!restart) return;
-  const OutputState& state = restart->run.output;
-  snapshots_.restore(state.snapshots, restart->run.loop.time);
-  rows_.restore(state.rows, restart->run.loop.time);
-  next_analysis_ = state.next_analysis;
-  snapshot_number_ = state.snapshot_number;
-  last_row_ = restart->run.budget.first;
+  if (restart) {
+    const OutputState& state = restart->run.output;
+    snapshots_.restore(state.snapshots, restart->run.loop.time);
+    rows_.restore(state.rows, restart->run.loop.time);
+    next_analysis_ = state.next_analysis;
+    snapshot_number_ = state.snapshot_number;
+    last_row_ = restart->run.budget.first;
+  }
   io::cut_series(folder_, snapshot_number_, comm_);
 }
 
@@ -102,12 +106,13 @@ void Output::write_snapshot(const TimeLoop& loop, const ParticleOutput& particle
   header.cell = scene_.cell;
   header.target_mass = target_mass(scene_);
   header.scene_name = scene_.name;
-  const std::string name = io::snapshot_name(snapshot_number_++);
+  header.scene_keys = scene_keys_;
+  const std::uint64_t number = snapshot_number_++;
   const auto start = std::chrono::steady_clock::now();
-  io::write_snapshot(folder_ / name, header, particles, scene_.output.fields, comm_);
+  io::write_snapshot(folder_ / io::snapshot_name(number), header, particles, scene_.output.fields, comm_);
   const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   longest_write_ = std::max(longest_write_, seconds);
-  io::add_to_series(folder_, name, loop.time(), comm_);
+  io::add_to_series(folder_, number, loop.time(), comm_);
 }
 
 void Output::print_remnants(const ParticleOutput& particles, double time) {

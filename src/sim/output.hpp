@@ -45,9 +45,10 @@ class Schedule {
 /// Everything a run writes but checkpoints and the summary.
 class Output {
  public:
-  /// `end`: of the run [s]. Goes on where `restart` says. Collective.
-  Output(const Scene& scene, const std::filesystem::path& folder, double end, const std::optional<Restart>& restart,
-         Budget& budget, const mpi::Comm& comm);
+  /// `end`: of the run [s]. `keys`: of the scene as resolved, for the snapshots. Goes on where `restart` says.
+  /// Collective.
+  Output(const Scene& scene, const std::filesystem::path& folder, double end, const std::vector<ResolvedKey>& keys,
+         const std::optional<Restart>& restart, Budget& budget, const mpi::Comm& comm);
 
   [[nodiscard]] OutputState state() const {
     return {snapshots_.state(), rows_.state(), next_analysis_, snapshot_number_, 0.0};
@@ -71,6 +72,7 @@ class Output {
   void print_remnants(const ParticleOutput& particles, double time);
 
   const Scene& scene_;
+  std::string scene_keys_;
   std::filesystem::path folder_;
   mpi::Comm comm_;
   Budget& budget_;

@@ -4,16 +4,13 @@
 
 #include <chrono>
 #include <cstdio>
-#include <fstream>
 
 #include "breccia/error.hpp"
 #include "io/collectively.hpp"
-#include "io/output_folder.hpp"
-#include "sim/checkpoints.hpp"
+#include "sim/beginning.hpp"
 #include "sim/dump.hpp"
 #include "sim/interruptions.hpp"
 #include "sim/output.hpp"
-#include "sim/own_folder.hpp"
 #include "sim/progress.hpp"
 #include "sim/ranks_report.hpp"
 #include "sim/time_loop.hpp"
@@ -37,20 +34,6 @@ void print_profile(const StageTimers& timers, const std::string& decision, const
 }
 
 std::filesystem::path default_folder(const Scene& scene) { return std::filesystem::path("out") / scene.name; }
-
-// A run's end as its summary.json has it: nothing is left to do if it reached this one.
-bool finished(const std::filesystem::path& folder, double end, const RunOptions& options, const mpi::Comm& comm) {
-  bool done = false;
-  io::on_root(comm, [&] {
-    std::ifstream file(folder / "summary.json");
-    if (!file) return;
-    const nlohmann::json summary = nlohmann::json::parse(file, nullptr, false);
-    if (summary.is_discarded() || !summary.contains("time_step")) return;
-    const double reached = summary.value("simulated_time", 0.0) + 0.5 * summary.value("time_step", 0.0);
-    done = reached >= end || (options.steps && summary.value("steps", std::uint64_t{0}) >= *options.steps);
-  });
-  return comm.any(done);
-}
 
 std::unique_ptr<TimeLoop> make_loop(const Scene& scene, const std::optional<Restart>& restart, int threads,
                                     grid::EngineMaker make, const mpi::Comm& comm) {
@@ -90,25 +73,18 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   const double end = options.until.value_or(scene.time.end);
   const grid::EngineChoice engine =
       grid::choose_engine(device_for(scene, options.device), comm, scene.parallel.device_messages);
-  std::optional<Restart> restart;
-  if (options.restart.empty()) {
-    io::prepare_output_folder(options.out, comm);
-  } else {
-    require_own_folder(options.out, scene, options.resolved, comm);
-    if (options.restart == "auto" && finished(options.out, end, options, comm)) {
-      if (comm.is_root()) fmt::print("{}: this run is finished\n", options.out.string());
-      return;
-    }
-    io::continue_output_folder(options.out, comm);
-    restart = find_restart(options.restart, options.out, scene, options.resolved, comm);
-  }
+  Beginning beginning = begin(scene, options, end, comm);
+  if (beginning.finished) return;
+  std::optional<Restart>& restart = beginning.restart;
 
   const std::unique_ptr<TimeLoop> owned = make_loop(scene, restart, options.threads, engine.make, comm);
   TimeLoop& loop = *owned;
   print_device(engine, comm);
   Budget budget(loop.solver(), scene, comm);
   if (restart) budget.restore(restart->run.budget);
-  Output output(scene, options.out, end, restart, budget, comm);
+  // From here on the end that was is none.
+  io::remove_summary(options.out / "summary.json", comm);
+  Output output(scene, options.out, end, options.resolved, restart, budget, comm);
   const double wall_before = restart ? restart->run.output.wall_seconds : 0.0;
   const std::uint64_t first_checkpoint = restart ? restart->next_number : 0;
   restart.reset();
@@ -118,6 +94,11 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   Timeline timeline;
   const Timeline::Clock::time_point timeline_start = common_start(comm);
   if (!options.timeline.empty()) loop.record(timeline);
+  // After so many more steps of the present length.
+  const auto ends_after = [&](const TimeLoop& now, int steps) {
+    return now.time() + (steps + 0.5) * now.dt() >= end ||
+           (options.steps && now.step() + static_cast<std::uint64_t>(steps) >= *options.steps);
+  };
   const auto start = std::chrono::steady_clock::now();
   {
     Interruptions interruptions(options, scene, loop.time(), output, budget, wall_before, first_checkpoint, comm);
@@ -125,12 +106,14 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
     try {
       loop.run(
           [&](const TimeLoop& now) {
-            const bool last = now.time() + 0.5 * now.dt() >= end || (options.steps && now.step() >= *options.steps);
+            const bool last = ends_after(now, 0);
             output.at(now, last || now.step() == 0);
             progress.update(now.time(), now.step(), now.dt());
             return !last;
           },
-          [&](const TimeLoop& now) { return interruptions.at_window_start(now); });
+          [&](const TimeLoop& now) {
+            return interruptions.at_window_start(now, ends_after(now, scene.gravity.interval - 1));
+          });
     } catch (const NumericsError& error) {
       throw NumericsError(dump(loop, scene, error.what(), options.out, comm));
     }

@@ -2,10 +2,7 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
 #include <string_view>
 #include <type_traits>
 #include <utility>
@@ -157,22 +154,6 @@ OutputState output_from(const Json& json) {
   return output;
 }
 
-// Keys that neither the particles nor their fields depend on. Those that end in '.' stand for all below.
-constexpr std::array<std::string_view, 12> kHarmless{
-    "output.",         "parallel.",        "numerics.energy_gain", "scene.name",   "scene.end",     "time.cfl",
-    "effects.gravity", "gravity.interval", "gravity.opening",      "gravity.mesh", "gravity.split", "gravity.error"};
-
-bool harmless(const std::string& key) {
-  return std::ranges::any_of(kHarmless,
-                             [&](std::string_view k) { return k.ends_with('.') ? key.starts_with(k) : key == k; });
-}
-
-// Gravity as a whole cannot come or go: its method may change.
-std::string comparable(const std::string& key, const std::string& value) {
-  if (key == "effects.gravity") return value == "off" ? "off" : "on";
-  return harmless(key) ? "" : value;
-}
-
 }  // namespace
 
 std::string to_text(const RunState& state) {
@@ -197,25 +178,6 @@ RunState run_state_from(const std::string& text) {
   } catch (const nlohmann::json::exception& error) {
     throw IoError(std::string("the state of the run cannot be read: ") + error.what());
   }
-}
-
-void require_same_scene(const std::vector<ResolvedKey>& checkpoint, const std::vector<ResolvedKey>& scene,
-                        const std::string& file) {
-  std::map<std::string, std::pair<std::string, std::string>> values;
-  for (const ResolvedKey& key : checkpoint) values[key.key].first = comparable(key.key, key.value);
-  for (const ResolvedKey& key : scene) values[key.key].second = comparable(key.key, key.value);
-  std::string changed;
-  for (const auto& [key, pair] : values) {
-    if (pair.first == pair.second) continue;
-    const auto shown = [](const std::string& value) { return value.empty() ? std::string("not set") : value; };
-    changed += fmt::format("{}{} ({} there, {} here)", changed.empty() ? "" : ", ", key, shown(pair.first),
-                           shown(pair.second));
-  }
-  if (changed.empty()) return;
-  throw UsageError(
-      fmt::format("{} is of another scene: {}; take these keys as they were, or start anew without "
-                  "--restart in another folder",
-                  file, changed));
 }
 
 }  // namespace breccia::sim

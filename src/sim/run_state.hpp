@@ -78,9 +78,4 @@ struct RunState {
 /// Throws IoError if `text` is not what to_text() makes.
 [[nodiscard]] RunState run_state_from(const std::string& text);
 
-/// Throws UsageError naming every key whose change a restart cannot take: all but those of output, of the end, of the
-/// time step's safety and of the accuracy of gravity.
-void require_same_scene(const std::vector<ResolvedKey>& checkpoint, const std::vector<ResolvedKey>& scene,
-                        const std::string& file);
-
 }  // namespace breccia::sim

@@ -52,6 +52,9 @@ class Numerics(CommandTest):
                 self.assertIn("energy", error)
                 self.assertIn("numerics.energy_gain", error)
                 self.assertTrue((out / "dump.hdf").exists())
+                fastest = json.loads((out / "dump.json").read_text())["fastest_particle"]
+                self.assertGreater(max(map(abs, fastest["state"]["velocity"])), 200)
+                self.assertEqual(len(fastest["position"]), 3)
 
     def test_the_bound_is_a_key(self):
         scene = self.write_scene()

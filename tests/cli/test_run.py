@@ -21,9 +21,8 @@ class Run(CommandTest):
             with self.subTest(ranks=ranks):
                 out, summary = self.run_scene("--until", "10 s", ranks=ranks)
                 names = {path.name for path in out.iterdir()}
-                self.assertEqual(
-                    names, {"snap_0000.hdf", "snap_0001.hdf", "run.hdf.series", "diagnostics.csv", "summary.json"}
-                )
+                snapshots = {"snap_0000.hdf", "snap_0001.hdf", "run.hdf.series"}
+                self.assertEqual(names, snapshots | {"checkpoint_0000.h5", "diagnostics.csv", "summary.json"})
                 self.assertEqual((summary["particles"], summary["steps"], summary["ranks"]), (400, STEPS, ranks))
                 self.assertAlmostEqual(summary["simulated_time"], 10.0, delta=1e-9)
                 # The particles carry the mass: none may be lost.

@@ -1,6 +1,7 @@
 // The JSON of a checkpoint: refused with one line, or read to a state that is written and read back as the same.
 #include "sim/run_state.hpp"
 
+#include "sim/same_scene.hpp"
 #include "tests/fuzz/target.hpp"
 
 int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

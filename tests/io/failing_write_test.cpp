@@ -96,7 +96,7 @@ TEST(FailingWrite, FolderThatCannotBe) {
   const std::vector<std::pair<std::string, std::function<void()>>> calls{
       {out.string(), [&] { prepare_output_folder(out, comm); }},
       {"snap_0000.hdf", [&] { write_snapshot(out / "snap_0000.hdf", {}, particles, {}, comm); }},
-      {"run.hdf.series", [&] { add_to_series(out, "snap_0000.hdf", 0.0, comm); }},
+      {"run.hdf.series", [&] { add_to_series(out, 0, 0.0, comm); }},
       {"diagnostics.csv", [&] { const DiagnosticsWriter writer(out / "diagnostics.csv", comm); }},
       {"summary.json", [&] { write_summary(out / "summary.json", {}, comm); }},
   };

@@ -25,7 +25,7 @@ SnapshotHeader some_header() {
   header.target_mass = 1.41e18;
   header.period = {0.0, 5.0e4, 0.0};
   header.scene_name = "Köhler";
-  header.scene_toml = "[scene]\nname = \"Köhler\"\n";
+  header.scene_keys = "{\"scene.name\": \"Köhler\"}";
   return header;
 }
 
@@ -69,7 +69,7 @@ TEST_P(SnapshotRoundTrip, GivesEveryBitBack) {
   EXPECT_EQ(read.target_mass, wrote.target_mass);
   EXPECT_EQ(read.period.y, wrote.period.y);
   EXPECT_EQ(read.scene_name, wrote.scene_name);
-  EXPECT_EQ(read.scene_toml, wrote.scene_toml);
+  EXPECT_EQ(read.scene_keys, wrote.scene_keys);
   EXPECT_EQ(read.code_version, BRECCIA_VERSION);
   EXPECT_EQ(read.particles, total);
   if (total > 0) {

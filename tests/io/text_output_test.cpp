@@ -9,6 +9,7 @@
 
 #include "breccia/error.hpp"
 #include "io/diagnostics.hpp"
+#include "io/snapshot.hpp"
 #include "io/snapshot_series.hpp"
 #include "io/summary.hpp"
 #include "particles_for_test.hpp"
@@ -75,29 +76,59 @@ nlohmann::json read_json(const std::filesystem::path& path) {
   return nlohmann::json::parse(stream);
 }
 
-TEST(Series, KeepsEntriesInTheOrderOfTime) {
+TEST(Series, EndsWithTheSnapshotThatIsWritten) {
   const mpi::Comm comm;
   const test::ScratchFolder folder("series", comm);
-  add_to_series(folder.path(), snapshot_name(0), 0.0, comm);
-  add_to_series(folder.path(), snapshot_name(1), 1000.0 / 3.0, comm);
-  add_to_series(folder.path(), snapshot_name(10000), 1.0e5, comm);
-  add_to_series(folder.path(), snapshot_name(1), 500.0, comm);  // written again after a restart
-  comm.barrier();
-  const nlohmann::json series = read_json(folder.path() / "run.hdf.series");
-  EXPECT_EQ(series.at("file-series-version"), "1.0");
-  const nlohmann::json expected = {{{"name", "snap_0000.hdf"}, {"time", 0.0}},
-                                   {{"name", "snap_0001.hdf"}, {"time", 500.0}},
-                                   {{"name", "snap_10000.hdf"}, {"time", 1.0e5}}};
-  EXPECT_EQ(series.at("files"), expected);
+  const nlohmann::json first = {{"name", "snap_0000.hdf"}, {"time", 0.0}};
+  const nlohmann::json again = {{"name", "snap_0001.hdf"}, {"time", 500.0}};
+  const nlohmann::json last = {{"name", "snap_10000.hdf"}, {"time", 1.0e5}};
+  const auto files = [&] {
+    comm.barrier();
+    const nlohmann::json series = read_json(folder.path() / "run.hdf.series");
+    EXPECT_EQ(series.at("file-series-version"), "1.0");
+    nlohmann::json listed = series.at("files");
+    comm.barrier();
+    return listed;
+  };
+  add_to_series(folder.path(), 0, 0.0, comm);
+  add_to_series(folder.path(), 1, 1000.0 / 3.0, comm);
+  add_to_series(folder.path(), 9999, 2000.0, comm);
+  add_to_series(folder.path(), 1, 500.0, comm);  // written again after a restart
+  EXPECT_EQ(files(), nlohmann::json::array({first, again}));
+  add_to_series(folder.path(), 10000, 1.0e5, comm);
+  EXPECT_EQ(files(), nlohmann::json::array({first, again, last}));
+  cut_series(folder.path(), 10000, comm);
+  EXPECT_EQ(files(), nlohmann::json::array({first, again}));
+  cut_series(folder.path(), 0, comm);
+  EXPECT_EQ(files(), nlohmann::json::array());
   EXPECT_EQ(test::names_in(folder.path()), std::vector<std::string>{"run.hdf.series"});
 }
 
-TEST(Series, ADamagedListIsNotOverwritten) {
+// From the snapshots themselves; one that cannot be read, later ones and files of other names are no part of it.
+TEST(Series, ADamagedListIsMadeAnew) {
   const mpi::Comm comm;
   const test::ScratchFolder folder("damaged_series", comm);
-  if (comm.is_root()) std::ofstream(folder.path() / "run.hdf.series") << "{\"files\": [";
-  comm.barrier();
-  EXPECT_THROW(add_to_series(folder.path(), snapshot_name(0), 0.0, comm), IoError);
+  for (const std::uint64_t number : {0, 1, 2, 5}) {
+    SnapshotHeader header;
+    header.time = 10.0 * static_cast<double>(number);
+    write_snapshot(folder.path() / snapshot_name(number), header, test::scattered_particles(5, comm), {}, comm);
+  }
+  for (const bool gone : {false, true}) {
+    if (comm.is_root()) {
+      std::ofstream(folder.path() / "run.hdf.series") << "{\"files\": [";
+      if (gone) std::filesystem::remove(folder.path() / "run.hdf.series");
+      std::ofstream(folder.path() / "snap_0001.hdf") << "short";
+      std::ofstream(folder.path() / "snap_00.hdf") << "";
+    }
+    comm.barrier();
+    add_to_series(folder.path(), 3, 35.0, comm);
+    comm.barrier();
+    const nlohmann::json expected = {{{"name", "snap_0000.hdf"}, {"time", 0.0}},
+                                     {{"name", "snap_0002.hdf"}, {"time", 20.0}},
+                                     {{"name", "snap_0003.hdf"}, {"time", 35.0}}};
+    EXPECT_EQ(read_json(folder.path() / "run.hdf.series").at("files"), expected);
+    comm.barrier();
+  }
 }
 
 TEST(Summary, HasTheKeysOtherProgramsRelyOn) {

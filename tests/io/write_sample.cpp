@@ -54,8 +54,7 @@ int main(int argc, char** argv) {
   header.step = 819200;
   header.cell = 2500.0;
   header.scene_name = "contact binary";
-  header.scene_toml =
-      "[scene]\nname = \"contact binary\"\n[[body]]\nname = \"target\"\n[[body]]\nname = \"impactor\"\n";
+  header.scene_keys = R"({"body[0].name": "target", "body[1].name": "impactor"})";
   try {
     const ParticleOutput particles = contact_binary(std::strtoull(argv[2], nullptr, 10), comm);
     const double start = MPI_Wtime();

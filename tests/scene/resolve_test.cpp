@@ -68,6 +68,14 @@ TEST(Resolve, ImpactNeedsTwoBodiesThatCanMeet) {
   EXPECT_EQ(load_text(kImpact, {"impact.separation=250 km"}).scene.impact->separation, 2.5e5);
 }
 
+TEST(Resolve, NothingIsFasterThanLight) {
+  EXPECT_EQ(usage_error(kSphere + "velocity = [\"0\", \"2.9e8 m/s\", \"0\"]\n"), "");
+  const std::string error = usage_error(kSphere + "velocity = [\"0\", \"-1e30 m/s\", \"0\"]\n");
+  EXPECT_TRUE(contains(error, "body[0].velocity: ")) << error;
+  EXPECT_TRUE(contains(error, "would move at 1e+30 m/s, faster than light")) << error;
+  EXPECT_TRUE(contains(usage_error(kSphere + "spin = [\"0\", \"1e5 rad/s\", \"0\"]\n"), "body[0].spin: "));
+}
+
 TEST(Resolve, Boundaries) {
   const std::string plane = kSphere + "[[boundary]]\npoint = [\"0\", \"0\", \"-50 km\"]\n";
   EXPECT_EQ(usage_error(plane + "normal = [0, 0, 3]\nkind = \"slip\"\n"), "");

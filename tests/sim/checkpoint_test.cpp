@@ -12,6 +12,7 @@
 
 #include "breccia/error.hpp"
 #include "io/checksum.hpp"
+#include "sim/checkpoints.hpp"
 #include "tests/sim/collision.hpp"
 #include "tests/support/shared_file.hpp"
 
@@ -123,6 +124,8 @@ void expect_bitwise(std::vector<std::string> overrides, bool breaking = false) {
 TEST(Checkpoint, EveryEffectDouble) { expect_bitwise({}, true); }
 TEST(Checkpoint, EveryEffectMixed) { expect_bitwise({"numerics.precision=mixed"}, true); }
 TEST(Checkpoint, TreeGravity) { expect_bitwise({"effects.gravity=tree", "numerics.precision=mixed"}); }
+TEST(Checkpoint, ParticleMeshGravity) { expect_bitwise({"effects.gravity=treepm", "numerics.precision=mixed"}); }
+TEST(Checkpoint, GravityByTheCheapestMethod) { expect_bitwise({"effects.gravity=auto", "numerics.precision=mixed"}); }
 TEST(Checkpoint, WithoutGravity) { expect_bitwise({"effects.gravity=off"}); }
 TEST(Checkpoint, AdaptiveStep) { expect_bitwise({"time.step=auto", "numerics.precision=mixed"}); }
 TEST(Checkpoint, NoDamage) { expect_bitwise({"effects.damage=off"}); }
@@ -305,6 +308,30 @@ TEST(Checkpoint, OtherFormats) {
       EXPECT_NE(std::string(error.what()).find(expected), std::string::npos) << error.what();
     }
   }
+}
+
+// One is taken that is whole but for its meaning, and none of another format's: the program that wrote it can go on.
+TEST(Checkpoint, OneOfAnotherFormatIsNotPassedOver) {
+  const mpi::Comm comm;
+  const breccia::test::SharedFile place("checkpoints", comm);
+  const std::filesystem::path& folder = place.path();
+  if (comm.is_root()) std::filesystem::create_directory(folder);
+  comm.barrier();
+  const Scene scene = load(collision(9e3), {"gravity.interval=8"});
+  TimeLoop loop(scene, resolve_effects(scene), 1, comm);
+  loop.run([](const TimeLoop&) { return true; },
+           [&](const TimeLoop& now) {
+             const RunState run{now.state(), {}, {}, {}};
+             io::write_checkpoint(folder / "checkpoint_0000.h5", {now.engine().save(), to_text(run)}, comm);
+             io::write_checkpoint(folder / "checkpoint_0001.h5", {now.engine().save(), "{}"}, comm);
+             return false;
+           });
+  const auto found = find_restart("auto", folder, scene, {}, comm);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->next_number, 1U);
+  set_format(folder / "checkpoint_0001.h5", 4, comm);
+  io::append_checksum(folder / "checkpoint_0001.h5", comm);
+  EXPECT_THROW(static_cast<void>(find_restart("auto", folder, scene, {}, comm)), io::UnknownFormat);
 }
 
 TEST(Checkpoint, OtherNumberOfRanks) {

@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "breccia/error.hpp"
+#include "sim/suspects.hpp"
 #include "tests/sim/collision.hpp"
 
 namespace breccia::sim::test {
@@ -61,11 +62,13 @@ void set(EngineState& state, const std::string& name, std::size_t component, dou
   }
 }
 
-std::uint64_t first_id(EngineState& state) {
+std::uint64_t id_of(EngineState& state, std::uint64_t particle) {
   std::uint32_t id = 0;
-  std::memcpy(&id, column(state, "id_low").values.data(), sizeof id);
+  std::memcpy(&id, column(state, "id_low").values.data() + particle * sizeof id, sizeof id);
   return id;
 }
+std::uint64_t first_id(EngineState& state) { return id_of(state, 0); }
+std::uint64_t last_id(EngineState& state) { return id_of(state, state.particles - 1); }
 
 struct Ending {
   std::string error;  // empty: the run came through
@@ -100,9 +103,9 @@ Ending ending_with(const Scene& scene, const std::function<void(EngineState&)>& 
 }
 
 // The id of the particle that ending_with() changes, on all ranks.
-std::uint64_t changed_id(const Scene& scene, const mpi::Comm& comm) {
+std::uint64_t changed_id(const Scene& scene, const mpi::Comm& comm, std::uint64_t (*which)(EngineState&) = first_id) {
   Saved saved = saved_state(scene, comm);
-  return comm.allgather(first_id(saved.engine)).back();
+  return comm.allgather(which(saved.engine)).back();
 }
 
 class NotFinite : public testing::TestWithParam<std::tuple<const char*, const char*, double>> {};
@@ -172,6 +175,7 @@ TEST(Guard, MoreThanACellBetweenSortings) {
 TEST(Guard, LostParticle) {
   const mpi::Comm comm;
   const Scene scene = scene_with({});
+  const std::uint64_t lost = changed_id(scene, comm, last_id);
   const Ending ending = ending_with(
       scene,
       [](EngineState& state) {
@@ -180,7 +184,23 @@ TEST(Guard, LostParticle) {
         --state.particles;
       },
       comm);
-  EXPECT_NE(ending.error.find("particles are left of"), std::string::npos) << ending.error;
+  const std::string expected = " particles are left of ", id = ", without those of the ids " + std::to_string(lost);
+  EXPECT_NE(ending.error.find(expected), std::string::npos) << ending.error;
+  EXPECT_TRUE(ending.error.ends_with(id)) << ending.error;
+}
+
+// Each id on some rank: nothing is said; of many that are on none the first few.
+TEST(Guard, MissingIdsAreNamed) {
+  const mpi::Comm comm;
+  constexpr std::uint64_t kTotal = (std::uint64_t{1} << 20) + 10;  // more than are compared at a time
+  std::vector<std::uint64_t> ids;
+  const auto ranks = static_cast<std::uint64_t>(comm.size());
+  for (auto id = static_cast<std::uint64_t>(comm.rank()); id < kTotal; id += ranks) ids.push_back(id);
+  EXPECT_EQ(missing_ids(ids, kTotal, comm), "");
+  std::erase_if(ids, [](std::uint64_t id) { return id == 3 || id == kTotal - 1; });
+  EXPECT_EQ(missing_ids(ids, kTotal, comm), "3, " + std::to_string(kTotal - 1));
+  std::erase_if(ids, [](std::uint64_t id) { return id < 9; });
+  EXPECT_EQ(missing_ids(ids, kTotal, comm), "0, 1, 2, 3, 4 and 5 others");
 }
 
 TEST(Guard, CollapseOfTheTimeStep) {

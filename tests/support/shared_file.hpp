@@ -19,7 +19,7 @@ class SharedFile {
   }
   ~SharedFile() {
     comm_.barrier();
-    if (comm_.is_root()) std::filesystem::remove(path_);
+    if (comm_.is_root()) std::filesystem::remove_all(path_);
   }
   SharedFile(const SharedFile&) = delete;
   SharedFile& operator=(const SharedFile&) = delete;

@@ -1,6 +1,6 @@
 """Snapshots as numpy arrays."""
 
-import tomllib
+import json
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -38,10 +38,15 @@ def _text(value):
 
 
 def _body_names(scene):
+    """From the scene's keys as the snapshot has them: {"body[0].name": "target", ...}."""
     try:
-        return [body.get("name", "") for body in tomllib.loads(scene).get("body", [])]
-    except tomllib.TOMLDecodeError:
+        keys = json.loads(scene)
+    except json.JSONDecodeError:
         return []
+    names = []
+    while f"body[{len(names)}].name" in keys:
+        names.append(keys[f"body[{len(names)}].name"])
+    return names
 
 
 def read(path):
