@@ -10,7 +10,7 @@ QUICK_SECONDS = 20
 
 
 def targets(root):
-    return sorted(path.stem for path in (root / "tests" / "fuzz").glob("*.cpp"))
+    return sorted(path.name for path in (root / "tests" / "fuzz" / "corpus").iterdir())
 
 
 def add_options(parser):
