@@ -9,7 +9,7 @@ namespace breccia::cuda {
 /// What a device does in a second, by its precision. Measured on an H100 (docs/gpu.md), by 94,648 and 1e6 particles in
 /// spheres, an elongated body with debris, and fragments; a tree takes the more launches the more its depths differ, 3
 /// to 11 ms, of which this is the middle. Those of laying boxes are counted, not measured: the host's choice takes 0.3
-/// to 0.8 ms of one core and waits eight times, the device reads each body four times and adds to eight numbers for it.
+/// to 1.6 ms of one core and waits seven times, the device reads each body four times and adds to eight numbers for it.
 struct DeviceRates {
   double direct_pairs;  ///< of the direct sum [1/s]
   double tree_pairs;    ///< of groups and near clusters: lists to follow, lanes without a target [1/s]

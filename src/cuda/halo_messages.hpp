@@ -30,7 +30,7 @@ class HaloMessages {
   virtual void finish(cudaStream_t stream) = 0;
   /// Where the host is going to wait for all that `stream` has to do: ends with IoError instead of waiting for ever if
   /// a message that it waits for is lost, as far as that is told.
-  virtual void watch(cudaStream_t /*stream*/) const {}
+  virtual void watch(cudaStream_t /*stream*/) {}
 };
 
 enum class MessageWay { kPinnedMpi, kDeviceMpi, kNccl };

@@ -36,7 +36,9 @@ Library load() {
   Library library;
   find(handle, file, "ncclGetErrorString", library.get_error_string);
   find(handle, file, "ncclGetVersion", library.get_version);
-  library.check(library.get_version(&library.version), "version");
+  if (const Result result = library.get_version(&library.version); result != kSuccess) {
+    throw UsageError(file + " does not tell its version: " + library.get_error_string(result));
+  }
   if (library.version < kFirstVersion) {
     throw UsageError(file + " is " + describe(library) + ", which has no messages between two ranks: 2.7 is the first");
   }

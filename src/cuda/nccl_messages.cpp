@@ -1,7 +1,9 @@
 #include "cuda/nccl_messages.hpp"
 
+#include <chrono>
 #include <cstring>
 #include <exception>
+#include <future>
 #include <set>
 #include <thread>
 #include <utility>
@@ -12,6 +14,20 @@
 #include "mpi/together.hpp"
 
 namespace breccia::cuda {
+namespace {
+
+// What is under way on this device ends as soon as the call has begun, and must before memory of the device is given
+// back, which waits for all of it. The call itself returns only after all ranks of the node have made it: it gets a
+// thread of its own, which is left to the end of the program where they do not come.
+void abandon(const nccl::Library& library, nccl::Handle handle) {
+  constexpr std::chrono::seconds kPatience{2};
+  std::packaged_task<void()> task([abort = library.comm_abort, handle] { (void)abort(handle); });
+  const std::future<void> done = task.get_future();
+  std::thread(std::move(task)).detach();
+  (void)done.wait_for(kPatience);
+}
+
+}  // namespace
 
 NcclCommunicator::NcclCommunicator(const nccl::Library& library, const mpi::Comm& comm)
     : library_(library), exceptions_(std::uncaught_exceptions()) {
@@ -24,8 +40,12 @@ NcclCommunicator::NcclCommunicator(const nccl::Library& library, const mpi::Comm
 }
 
 NcclCommunicator::~NcclCommunicator() {
-  const bool in_order = std::uncaught_exceptions() == exceptions_;
-  (void)(in_order ? library_.comm_destroy : library_.comm_abort)(handle_);
+  if (handle_ == nullptr) return;
+  if (std::uncaught_exceptions() == exceptions_) {
+    (void)library_.comm_destroy(handle_);
+  } else {
+    abandon(library_, handle_);
+  }
 }
 
 void NcclCommunicator::exchange(const std::vector<HaloPart>& parts, std::size_t block_bytes, const void* from, void* to,
@@ -43,10 +63,11 @@ void NcclCommunicator::exchange(const std::vector<HaloPart>& parts, std::size_t 
   library_.check(library_.group_end(), "messages");
 }
 
-void NcclCommunicator::look_for_errors() const {
+void NcclCommunicator::look_for_errors() {
   nccl::Result error = nccl::kSuccess;
   library_.check(library_.comm_get_async_error(handle_, &error), "state of the messages");
   if (error == nccl::kSuccess) return;
+  abandon(library_, std::exchange(handle_, nullptr));
   throw IoError(std::string("NCCL: messages between ranks: ") + library_.get_error_string(error) +
                 "; go on from the last checkpoint with --restart auto");
 }
@@ -58,7 +79,7 @@ NcclMessages::NcclMessages(const nccl::Library& library, std::size_t block_bytes
 
 // Connections are made at first use: most of the memory that they take of a device is taken here, before what is free
 // is counted.
-void NcclMessages::greet_neighbours() const {
+void NcclMessages::greet_neighbours() {
   const int ranks = comm_.size();
   std::vector<HaloPart> parts;
   for (const int rank : std::set{(comm_.rank() + 1) % ranks, (comm_.rank() + ranks - 1) % ranks}) {
@@ -105,7 +126,7 @@ void NcclMessages::start(cudaStream_t stream) {
 }
 
 // A message of a rank that is gone never comes, and neither does the end of the stream.
-void NcclMessages::watch(cudaStream_t stream) const {
+void NcclMessages::watch(cudaStream_t stream) {
   for (;;) {
     const cudaError_t status = cudaStreamQuery(stream);
     communicator_.look_for_errors();

@@ -12,7 +12,8 @@ class NcclCommunicator {
  public:
   /// Collective. Throws IoError.
   NcclCommunicator(const nccl::Library& library, const mpi::Comm& comm);
-  /// Collective, but while an exception passes: then other ranks may not come, and what still waits for them ends.
+  /// Collective, but while an exception passes: then other ranks may not come, and what waits for them on this device
+  /// ends.
   ~NcclCommunicator();
   NcclCommunicator(const NcclCommunicator&) = delete;
   NcclCommunicator& operator=(const NcclCommunicator&) = delete;
@@ -21,8 +22,9 @@ class NcclCommunicator {
   /// stream. Hosts of ranks that meet for the first time wait for each other; no others do.
   void exchange(const std::vector<HaloPart>& parts, std::size_t block_bytes, const void* from, void* to,
                 cudaStream_t stream) const;
-  /// Throws IoError if something has gone wrong since.
-  void look_for_errors() const;
+  /// Throws IoError if something has gone wrong since: then nothing of this device waits for messages any more, and
+  /// none can be sent.
+  void look_for_errors();
 
  private:
   nccl::Library library_;
@@ -39,10 +41,10 @@ class NcclMessages final : public HaloMessages {
   void set(std::vector<HaloPart> parts, const void* sent, void* received) override;
   void start(cudaStream_t stream) override;
   void finish(cudaStream_t /*stream*/) override {}  // in the order of the stream already
-  void watch(cudaStream_t stream) const override;
+  void watch(cudaStream_t stream) override;
 
  private:
-  void greet_neighbours() const;
+  void greet_neighbours();
 
   std::size_t block_bytes_;
   mpi::Comm comm_;

@@ -31,8 +31,12 @@ void HostEngine<P>::hold_sums() {
 template <class P>
 void HostEngine<P>::hold_velocities() {
   // Read are velocities of nodes that a scatter has reached since, and with weight 0 those beside them.
-  velocities_.reserve(blocks_.size() * kBlockReals);  // else it might grow to twice that
-  velocities_.resize(blocks_.size() * kBlockReals, Real(0));
+  const std::size_t blocks = blocks_.size();
+  if (blocks * kBlockReals > velocities_.capacity()) {
+    release(velocities_);
+    velocities_.reserve((has_few_nodes() ? blocks : blocks + blocks / 32) * kBlockReals);
+  }
+  velocities_.resize(blocks * kBlockReals, Real(0));
 }
 
 template <class P>

@@ -188,6 +188,7 @@ TEST_F(Nccl, FirstMessageMustComeAsItWasSent) {
 // An exception on one rank does not wait for the others, who know nothing of it yet.
 TEST_F(Nccl, RankThatFailsLeavesAlone) {
   const Variable patience("BRECCIA_NCCL_PATIENCE", "1");
+  const Variable planted("BRECCIA_NCCL_FAULT", "deserted");
   expect_error<UsageError>("alone", [&] {
     const NcclMessages messages(nccl::load(), sizeof(double), world_);
     if (world_.rank() > 0) world_.barrier();

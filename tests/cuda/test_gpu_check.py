@@ -1,9 +1,12 @@
 """tools/gpu-check without a GPU: what it says, and all that it does with the library of the emulated device."""
 
 import ctypes
+import importlib.machinery
+import importlib.util
 import json
 import os
 import subprocess
+import sys
 import tempfile
 import unittest
 from pathlib import Path
@@ -46,6 +49,21 @@ class GpuCheck(unittest.TestCase):
         self.assertEqual((gravity["chosen"], gravity["particles"]), ("direct", 1200))
         self.assertLess(gravity["rms"], 1e-5)
         self.assertIn("emulated", process.stdout)
+
+    def test_missing_library_is_told_from_wrong_messages(self):
+        loader = importlib.machinery.SourceFileLoader("gpu_check", str(ROOT / "tools/gpu-check"))
+        check = importlib.util.module_from_spec(importlib.util.spec_from_loader("gpu_check", loader))
+        sys.dont_write_bytecode = True
+        loader.exec_module(check)
+        missing = check.reason(
+            'breccia: error: parallel.device_messages = "nccl": libnccl.so.2: cannot open\n-----\nmpirun: rank 0 ...\n-----\n'
+        )
+        self.assertTrue(check.is_missing(missing), missing)
+        wrong = check.reason(
+            "breccia: error: NCCL: the first message of rank 1 to rank 0 did not come as it was sent; run with "
+            'parallel.device_messages = "mpi"\n-----\n'
+        )
+        self.assertFalse(check.is_missing(wrong), wrong)
 
     def test_build_that_is_not_there(self):
         process = gpu_check("--emulated", "--build", "/nowhere")
