@@ -60,7 +60,7 @@ Handle parallel_access(const mpi::Comm& comm) {
 // that has its final name.
 Handle access_of_a_reader() {
   Handle access = checked(H5Pcreate(H5P_FILE_ACCESS), H5Pclose);
-#if H5_VERSION_GE(1, 10, 7)
+#if H5_VERSION_GE(1, 12, 1) || (H5_VERSION_GE(1, 10, 7) && !H5_VERSION_GE(1, 11, 0))
   check(H5Pset_file_locking(access.get(), false, true));
 #endif
   return access;

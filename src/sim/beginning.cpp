@@ -27,8 +27,14 @@ void remove_stale_stop(const fs::path& folder, const mpi::Comm& comm) {
 }
 
 // A run that ended is a result, unless it did so in its first window, which has no checkpoint and costs nothing.
-void require_repeatable(const OldResults& old, const Scene& scene, const fs::path& folder) {
-  if (!old.ended || old.steps <= static_cast<std::uint64_t>(scene.gravity.interval)) return;
+void require_repeatable(const OldResults& old, const fs::path& folder) {
+  if (old.headless) {
+    throw UsageError(
+        fmt::format("output folder {} holds a run without a checkpoint of its own, which did not begin there: name the "
+                    "checkpoint that it began at with --restart FILE, or another folder with --out",
+                    folder.string()));
+  }
+  if (!old.ended || old.steps <= old.window) return;
   throw UsageError(
       fmt::format("output folder {} holds a run that ended at step {} without a checkpoint, so that it cannot go on: "
                   "name another folder with --out for one from the start",
@@ -50,7 +56,7 @@ Beginning begin(const Scene& scene, const RunOptions& options, double end, const
   io::continue_output_folder(options.out, comm);
   Beginning beginning{false, find_restart(options.restart, options.out, scene, options.resolved, comm)};
   if (!beginning.restart && old.any) {
-    require_repeatable(old, scene, options.out);
+    require_repeatable(old, options.out);
     if (comm.is_root()) fmt::print(stderr, "breccia: no checkpoint in {}: starting anew\n", options.out.string());
   }
   remove_stale_stop(options.out, comm);

@@ -29,9 +29,9 @@ struct Record {
 
 void warn(const std::string& line) { fmt::print(stderr, "breccia: warning: {}\n", line); }
 
-std::string name_in(const std::vector<ResolvedKey>& keys) {
+std::string value_of(const char* name, const std::vector<ResolvedKey>& keys) {
   for (const ResolvedKey& key : keys) {
-    if (key.key == "scene.name") return key.value;
+    if (key.key == name) return key.value;
   }
   return {};
 }
@@ -44,11 +44,12 @@ std::optional<Record> record_of_summary(const fs::path& path, OldResults& old) {
     const nlohmann::json summary = nlohmann::json::parse(file);
     old.reached = summary.at("simulated_time").get<double>() + 0.5 * summary.at("time_step").get<double>();
     old.steps = summary.at("steps").get_ref<const nlohmann::json::number_unsigned_t&>();
-    old.ended = true;
     const std::vector<ResolvedKey> keys = keys_from(summary.at("scene").dump());
-    return Record{path, name_in(keys), keys};
-  } catch (const nlohmann::json::exception&) {
-    old.ended = false;
+    if (const std::string window = value_of("gravity.interval", keys); !window.empty())
+      old.window = std::stoull(window);
+    old.ended = true;
+    return Record{path, value_of("scene.name", keys), keys};
+  } catch (const std::exception&) {  // of the library for JSON, of a folder of that name, of a number that is none
     warn(fmt::format("{}: not the summary of a run; it is passed over", path.string()));
   }
   return std::nullopt;
@@ -78,6 +79,15 @@ void require_same(const Record& record, const fs::path& folder, const Scene& sce
   if (!record.keys.empty() && !keys.empty()) require_same_scene(record.keys, keys, record.file.string());
 }
 
+bool has_snapshots(const fs::path& folder) {
+  std::error_code none;
+  for (const fs::directory_entry& entry : fs::directory_iterator(folder, none)) {
+    const std::string name = entry.path().filename().string();
+    if (name.starts_with("snap_") && name.ends_with(".hdf")) return true;
+  }
+  return false;
+}
+
 }  // namespace
 
 OldResults old_results(const fs::path& folder, const Scene& scene, const std::vector<ResolvedKey>& keys,
@@ -85,6 +95,7 @@ OldResults old_results(const fs::path& folder, const Scene& scene, const std::ve
   OldResults old;
   io::on_root(comm, [&] {
     old.any = fs::exists(folder / "diagnostics.csv");
+    old.headless = has_snapshots(folder) && !fs::exists(folder / io::snapshot_name(0));
     std::optional<Record> record = record_of_summary(folder / "summary.json", old);
     if (!record) record = record_of_snapshot(folder / io::snapshot_name(0));
     if (record) require_same(*record, folder, scene, keys);

@@ -16,6 +16,8 @@ struct OldResults {
   bool ended = false;    ///< and came to its end, as its summary.json says:
   double reached = 0.0;  ///< simulated time, with half a step more [s]
   std::uint64_t steps = 0;
+  std::uint64_t window = 1;  ///< steps of its gravity windows
+  bool headless = false;     ///< there are snapshots, but not the first: it began at a checkpoint of another folder
 };
 
 /// Reads what `folder` holds before a run goes on there; nothing is changed. Throws IoError if the snapshots or the

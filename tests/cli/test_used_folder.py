@@ -52,6 +52,23 @@ class UsedFolder(CommandTest):
         self.assertIn(f"no checkpoint in {self.out}: starting anew", said)
         self.assertEqual(times(self.out), [0, 5])
 
+    def test_windows_of_the_run_before_count(self):
+        """Of 24 steps in windows of 8, which would be the first window now."""
+        self.run_scene("--steps", 24, *NO_CHECKPOINTS)
+        self.assert_refused(2, ["without a checkpoint"], "--steps", 30, "--set", "gravity.interval=64")
+
+    def test_branch_without_a_checkpoint_of_its_own(self):
+        self.run_scene("--steps", 60)
+        trunk, self.out = self.out, self.folder / "branch"
+        began = sorted(trunk.glob("checkpoint_*"))[0]
+        self.run_scene("--restart", began, "--steps", 62, *NO_CHECKPOINTS)
+        for ended in (True, False):
+            with self.subTest(ended=ended):
+                self.assert_refused(2, ["did not begin there", "--restart FILE"], "--steps", 70, "--set", "grid.cell=9 km"
+                                    if not ended else "output.keep=3")  # fmt: skip
+                (self.out / "summary.json").unlink(missing_ok=True)
+        self.assertIn("continuing from", self.run_scene("--restart", began, "--steps", 70))
+
     def test_end_within_the_first_window(self):
         """It leaves no checkpoint, and nothing that a new run would not have at once."""
         self.run_scene("--steps", 7)
