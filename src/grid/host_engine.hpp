@@ -79,6 +79,7 @@ class HostEngine final : public Engine {
 
   // Memory (host_engine_memory.cpp).
   [[nodiscard]] bool has_few_nodes() const;  // beside particles
+  void hold(LargeArray<Real>& values, std::size_t blocks);
   void hold_sums();
   void hold_velocities();
   void drop_sums();  // and the next: where nodes are few

@@ -17,26 +17,27 @@ bool HostEngine<P>::has_few_nodes() const {
   return 8 * blocks_.size() * kBlockReals * sizeof(Real) < store_.packs() * kLanes * store_.record_bytes();
 }
 
+// What the array held may be lost: its callers know that nobody reads it.
+template <class P>
+void HostEngine<P>::hold(LargeArray<Real>& values, std::size_t blocks) {
+  if (blocks * kBlockReals > values.capacity()) {
+    release(values);
+    // Where nodes are many, some room for the next sortings.
+    values.reserve((has_few_nodes() ? blocks : blocks + blocks / 32) * kBlockReals);
+  }
+  values.resize(blocks * kBlockReals, Real(0));
+}
+
 template <class P>
 void HostEngine<P>::hold_sums() {
-  const std::size_t blocks = std::max(blocks_.size(), ordered_.blocks());
-  if (blocks * kBlockReals > sums_.capacity()) {
-    // The grid update has cleared every sum, so none is to be kept; some room for the next sortings.
-    release(sums_);
-    sums_.reserve((has_few_nodes() ? blocks : blocks + blocks / 32) * kBlockReals);
-  }
-  sums_.resize(blocks * kBlockReals, Real(0));
+  // The grid update has cleared every sum.
+  hold(sums_, std::max(blocks_.size(), ordered_.blocks()));
 }
 
 template <class P>
 void HostEngine<P>::hold_velocities() {
   // Read are velocities of nodes that a scatter has reached since, and with weight 0 those beside them.
-  const std::size_t blocks = blocks_.size();
-  if (blocks * kBlockReals > velocities_.capacity()) {
-    release(velocities_);
-    velocities_.reserve((has_few_nodes() ? blocks : blocks + blocks / 32) * kBlockReals);
-  }
-  velocities_.resize(blocks * kBlockReals, Real(0));
+  hold(velocities_, blocks_.size());
 }
 
 template <class P>
