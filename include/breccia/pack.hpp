@@ -325,6 +325,19 @@ BRECCIA_HD Pack<S, W> sqrt(Pack<S, W> a) {
     return r;
   }
 }
+template <class S, int W>
+BRECCIA_HD Pack<S, W> reciprocal(Pack<S, W> a) {
+#if defined(__AVX512F__)
+  if constexpr (std::is_same_v<S, float> && W == 16) {
+    // An approximation of 14 bits and a step of Newton's.
+    const auto x = __builtin_bit_cast(__m512, a.v);
+    const __m512 y = _mm512_maskz_rcp14_ps(0xffff, x);
+    const __m512 missing = _mm512_fnmadd_ps(x, y, _mm512_set1_ps(1.0F));
+    return __builtin_bit_cast(typename Pack<S, W>::Vector, _mm512_fmadd_ps(y, missing, y));
+  }
+#endif
+  return Pack<S, W>(S(1)) / a;
+}
 /// Halving sums: a tree of depth log2(W) instead of a chain of W additions.
 template <class S, int W>
 BRECCIA_HD S horizontal_sum(Pack<S, W> a) {

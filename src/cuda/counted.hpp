@@ -36,6 +36,7 @@ struct Counted {
   friend Counted max(Counted a, Counted b) { return a > b ? a : b; }
   friend Counted abs(Counted a) { return Counted(a.value < 0 ? -a.value : a.value); }
   friend Counted sqrt(Counted a) { return did(breccia::sqrt(a.value)); }
+  friend Counted reciprocal(Counted a) { return did(breccia::reciprocal(a.value)); }
 };
 
 // Elementary functions by their series: about thirty operations each.

@@ -15,9 +15,14 @@ constexpr std::int32_t floor_div4(std::int32_t n) { return n >> 2; }
 // Cells from the lowest of a stack.
 struct CellInStack {
   int x, y, z;
-  // In storage order: z slowest, so that consecutive particles write to different rows of nodes.
+  // In storage order: z slowest, by pairs of cells whose stencils begin at the same pair of nodes (transfer_pairs.hpp),
+  // so that particles that follow each other mostly share their stencil.
   [[nodiscard]] constexpr std::uint32_t index() const {
-    return static_cast<std::uint32_t>((z * kBlockWidth + y) * kBlockWidth + x);
+    const int pair = (z + 1) / 2;
+    const int column = y * kBlockWidth + x;
+    const bool whole = z > 0 && z < kStackHeight - 1;
+    const int before = kBlockWidth * kBlockWidth * (pair == 0 ? 0 : 2 * pair - 1);
+    return static_cast<std::uint32_t>(before + (whole ? 2 * column + ((z + 1) & 1) : column));
   }
   [[nodiscard]] constexpr std::int32_t packed() const {
     return (x + kNodeBias) | (y + kNodeBias) << 8 | (z + kNodeBias) << 16;

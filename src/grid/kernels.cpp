@@ -58,10 +58,14 @@ void probe(const ProbeArguments<P>& a, std::uint32_t index) {
     for (int lane = 0; lane < lanes; ++lane) {
       const std::size_t slot = pack * P::kLanes + static_cast<std::size_t>(lane);
       for (std::size_t axis = 0; axis < 3; ++axis) {
-        a.new_velocity[3 * slot + axis] = grid.value[kNewVelocity + axis][lane] +
-                                          alpha * (k.velocity[axis][lane] - grid.value[kOldVelocity + axis][lane]);
+        a.new_velocity[3 * slot + axis] =
+            grid.updated[axis][lane] + alpha * (k.velocity[axis][lane] - grid.previous[axis][lane]);
       }
-      a.node_mass[slot] = grid.value[kMass][lane];
+      Real mass(0);
+      stencil.for_each_node(lane, [&](Real weight, int n) BRECCIA_INLINE_LAMBDA {
+        mass += weight * nodes.velocities[place_of_mass<P>(n)];
+      });
+      a.node_mass[slot] = mass;
       const Real c = Real(4) / a.cell;  // as TileGrid::velocity
       for (std::size_t row = 0; row < 3; ++row) {
         Real* const gradient = a.gradient + 9 * slot + 3 * row;

@@ -79,7 +79,9 @@ BRECCIA_HD void probe_lone(const ProbeArguments<P>& a) {
       for (std::size_t axis = 0; axis < 3; ++axis) {
         a.new_velocity[3 * slot + axis] = k.velocity[axis][lane] + a.kick * gravity[axis][lane];
       }
-      a.node_mass[slot] = k.mass[lane] * stencil.sum_of_squares(lane);
+      typename P::Real squares(0);
+      stencil.for_each_node(lane, [&](auto weight, int) BRECCIA_INLINE_LAMBDA { squares += weight * weight; });
+      a.node_mass[slot] = k.mass[lane] * squares;
       for (std::size_t n9 = 0; n9 < 9; ++n9) {
         a.gradient[9 * slot + n9] = a.affine[pack].gradient[n9][lane] - a.kick * rate[n9][lane];
       }

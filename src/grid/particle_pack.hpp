@@ -146,9 +146,9 @@ BRECCIA_HD void grow_damage(const PassArguments<P>& a, std::size_t i, typename P
   using Real = typename P::Real;
   using T = typename P::RealPack;
   Flaws<P>& f = a.flaws[i];
-  // Rounding must not hide a flaw that is just reached, hence the small share.
-  const T bound = material::principal_strain_bound(s) * T(Real(1.0001));
-  if (any(bound > next_threshold(f))) activate_flaws(a, f, material::principal_strain(s));
+  if (any(material::principal_strain_may_exceed(s, next_threshold(f)))) {
+    activate_flaws(a, f, material::principal_strain(s));
+  }
   using I = typename P::IntPack;
   const T active = convert<Real>(f.state & I(255));
   const auto growing = (active > T(Real(0))) & (s.damage_root < T(Real(1)));

@@ -1,7 +1,7 @@
 // Quadratic B-spline weights of a pack of particles.
 #pragma once
 
-#include "grid/tile.hpp"
+#include "grid/tile_velocities.hpp"
 
 namespace breccia::grid {
 
@@ -18,21 +18,18 @@ BRECCIA_HD Pack<std::int32_t, W> stencil_start(Pack<std::int32_t, W> node, int a
   return ((node >> (8 * axis)) & I(255)) - I(kNodeBias - 1);
 }
 
-/// Two nodes that follow each other along z fill a register: transfers take nodes by pairs (transfer_pairs.hpp).
-template <class P>
-inline constexpr bool kNodePairs = static_cast<int>(sizeof(typename P::Real)) * 2 * kChannels == kRegisterBytes;
-
-/// Weights w_k of three nodes along an axis. First moments are taken about the nearest node, sum w_k (k - 1) n_k, which
-/// needs no weights of its own; `offset` turns them into moments about the particle. Where nodes are taken by pairs
-/// there are four along z, one of them with weight 0, so that the first is even; their moments are tabulated.
+/// The nodes around the particles of a pack and their weights: products along x and y, and those along z. Along z the
+/// gather takes the three nodes; where nodes are taken by pairs the scatter takes four, one of them with weight 0, so
+/// that the first is even. First moments are taken about the nearest node, sum w_k (k - 1) n_k, which needs no weights
+/// of its own but along z by pairs; `offset` turns them into moments about the particle.
 template <class P>
 struct Stencil {
   using Real = typename P::Real;
   using T = typename P::RealPack;
   static constexpr int kAlongZ = kNodePairs<P> ? 4 : 3;
 
-  T offset[3];                               ///< of the particle from its nearest node [cells]
-  alignas(64) Real weight[2][3][P::kLanes];  ///< x and y
+  T offset[3];                                  ///< of the particle from its nearest node [cells]
+  alignas(64) Real weight_xy[3][3][P::kLanes];  ///< of the column (x, y)
   alignas(64) Real weight_z[kAlongZ][P::kLanes];
   alignas(64) Real moment_z[kAlongZ][P::kLanes];  ///< only for pairs
   alignas(64) std::int32_t start[P::kLanes];      ///< index of the first node in the tile
@@ -46,22 +43,28 @@ struct Stencil {
     return {stencil_start(k.node, 0), stencil_start(k.node, 1), stencil_start(k.node, 2)};
   }
 
-  /// Sets the stencil of all lanes. The start of those outside the margin is made harmless.
+  /// Sets the stencil of all lanes to three nodes along z. The start of those outside the margin is made harmless.
   BRECCIA_HD Place set(const Kinematics<P>& k) {
-    using I = typename P::IntPack;
     const Place p = place(k);
-    const I z = p.axis[2];
-    for (int axis = 0; axis < 3; ++axis) offset[axis] = offset_in_cells(k.offset[axis]);
-    store(Weights(offset[0]), weight[0]);
-    store(Weights(offset[1]), weight[1]);
-    if constexpr (kNodePairs<P>) {
-      store_pairs(Weights(offset[2]), (z & I(1)) == I(1));
-    } else {
-      store(Weights(offset[2]), weight_z);
-    }
-    const I first = kNodePairs<P> ? z & I(~1) : z;
-    select(outside(p), I(0), p.axis[0] * I(kTilePlane) + p.axis[1] * I(kTileHeight) + first).store(start);
+    set_columns(k);
+    const Weights w(offset[2]);
+    for (int i = 0; i < 3; ++i) w.node[i].store(weight_z[i]);
+    set_start(p, p.axis[2]);
     return p;
+  }
+
+  /// The same for a scatter: two pairs of nodes along z where pairs fit a register.
+  BRECCIA_HD Place set_for_scatter(const Kinematics<P>& k) {
+    using I = typename P::IntPack;
+    if constexpr (kNodePairs<P>) {
+      const Place p = place(k);
+      set_columns(k);
+      store_pairs(Weights(offset[2]), (p.axis[2] & I(1)) == I(1));
+      set_start(p, p.axis[2] & I(~1));
+      return p;
+    } else {
+      return set(k);
+    }
   }
 
   /// Lanes whose stencil reaches beyond the tile.
@@ -72,15 +75,16 @@ struct Stencil {
     return (low < I(0)) | (high > I(kTileWidth - 3));
   }
 
-  /// sum over the nodes of w^2.
-  BRECCIA_HD Real sum_of_squares(int lane) const {
-    Real x(0), y(0), z(0);
-    for (int i = 0; i < 3; ++i) {
-      x += weight[0][i][lane] * weight[0][i][lane];
-      y += weight[1][i][lane] * weight[1][i][lane];
+  /// Calls visit(weight, index of the node in the tile) for the 27 nodes of a lane; after set().
+  template <class F>
+  BRECCIA_HD void for_each_node(int lane, F&& visit) const {
+    for (int x = 0; x < 3; ++x) {
+      for (int y = 0; y < 3; ++y) {
+        for (int z = 0; z < 3; ++z) {
+          visit(weight_xy[x][y][lane] * weight_z[z][lane], start[lane] + tile_index(x, y, z));
+        }
+      }
     }
-    for (int i = 0; i < kAlongZ; ++i) z += weight_z[i][lane] * weight_z[i][lane];
-    return x * y * z;
   }
 
  private:
@@ -96,8 +100,18 @@ struct Stencil {
     }
   };
 
-  BRECCIA_HD static void store(const Weights& w, Real (&to)[3][P::kLanes]) {
-    for (int i = 0; i < 3; ++i) w.node[i].store(to[i]);
+  BRECCIA_HD void set_columns(const Kinematics<P>& k) {
+    for (int axis = 0; axis < 3; ++axis) offset[axis] = offset_in_cells(k.offset[axis]);
+    const Weights x(offset[0]);
+    const Weights y(offset[1]);
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) (x.node[i] * y.node[j]).store(weight_xy[i][j]);
+    }
+  }
+
+  BRECCIA_HD void set_start(const Place& p, typename P::IntPack z) {
+    using I = typename P::IntPack;
+    select(outside(p), I(0), p.axis[0] * I(kTilePlane) + p.axis[1] * I(kTileHeight) + z).store(start);
   }
 
   BRECCIA_HD void store_pairs(const Weights& w, typename T::Mask odd) {

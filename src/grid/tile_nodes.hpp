@@ -2,7 +2,7 @@
 // touch is copied, along z by pairs of nodes: a pair is a cache line in mixed precision and never crosses blocks.
 #pragma once
 
-#include "grid/tile.hpp"
+#include "grid/tile_velocities.hpp"
 
 namespace breccia::grid {
 
@@ -63,9 +63,6 @@ BRECCIA_HD void for_each_pair(const Column& column, const TileBox& box, F&& pair
   }
 }
 
-template <class P>
-using TwoNodes = Pack<typename P::Real, 2 * kChannels>;
-
 constexpr std::size_t at(std::uint32_t block, int node) {
   return (std::size_t{block} * kBlockNodes + static_cast<std::size_t>(node)) * kChannels;
 }
@@ -93,12 +90,12 @@ inline constexpr Real kNoNodes alignas(64)[kBlockNodes * kChannels] = {};
 template <class P>
 BRECCIA_HD void load_tile(const Tile& tile, const TileBox& box, const typename P::Real* blocks,
                           typename P::Real* nodes) {
-  using N = detail::TwoNodes<P>;
+  using N = TwoNodes<P>;
   detail::for_each_column(tile, box, [&](const detail::Column& column) BRECCIA_INLINE_LAMBDA {
     // Where a box ends inside a pair, the other node may belong to a block that no particle reaches.
     const detail::PairStarts<const typename P::Real> from(column, blocks, detail::kNoNodes<typename P::Real>);
     detail::for_each_pair(column, box, [&](int in_block, int in_tile, int p) BRECCIA_INLINE_LAMBDA {
-      N::load(from.pair[p] + in_block * kChannels).store(nodes + (column.in_tile + in_tile + 2 * p) * kChannels);
+      put_velocities<P>(N::load(from.pair[p] + in_block * kChannels), column.in_tile + in_tile + 2 * p, nodes);
     });
   });
 }
@@ -109,7 +106,7 @@ BRECCIA_HD void load_tile(const Tile& tile, const TileBox& box, const typename P
 template <class P>
 [[nodiscard]] BRECCIA_HD bool add_tile(const Tile& tile, const TileBox& box, typename P::Real* nodes,
                                        typename P::Real* blocks, typename P::Real* beyond) {
-  using N = detail::TwoNodes<P>;
+  using N = TwoNodes<P>;
   bool unknown = false;
   detail::for_each_column(tile, box, [&](const detail::Column& column) BRECCIA_INLINE_LAMBDA {
     const detail::PairStarts<typename P::Real> to(column, blocks, beyond);

@@ -10,9 +10,9 @@ namespace breccia::grid {
 /// Node values of the tile, read and written: what a layer of its particles touches fits the first-level cache.
 template <class P>
 struct TileScratch {
-  alignas(64) typename P::Real velocities[kTileNodes * kChannels];
-  alignas(64) typename P::Real sums[kTileNodes * kChannels];     ///< zero before and after each tile
-  alignas(64) typename P::Real beyond[kBlockNodes * kChannels];  ///< zero
+  alignas(64) typename P::Real velocities[kTileNodes * kChannels];  ///< as tile_velocities.hpp lays them out
+  alignas(64) typename P::Real sums[kTileNodes * kChannels];        ///< zero before and after each tile
+  alignas(64) typename P::Real beyond[kBlockNodes * kChannels];     ///< zero
 };
 
 /// The grid of a tile as its packs see it.
@@ -45,14 +45,14 @@ class TileGrid {
     stencil_.set(k);
     const GatheredVelocity<P> g = gather<P>(scratch_.velocities, stencil_, lanes);
     const T c(Real(4) / a_.cell);  // (4 / dx^2) * dx, moments being in cells
-    return {{g.value[0], g.value[1], g.value[2]},
-            {g.value[3], g.value[4], g.value[5]},
+    return {{g.updated[0], g.updated[1], g.updated[2]},
+            {g.previous[0], g.previous[1], g.previous[2]},
             {c * g.by_x[0], c * g.by_y[0], c * g.by_z[0], c * g.by_x[1], c * g.by_y[1], c * g.by_z[1], c * g.by_x[2],
              c * g.by_y[2], c * g.by_z[2]}};
   }
 
   BRECCIA_HD void scatter(std::size_t i, int lanes, const Kinematics<P>& k, const PackStress<P>& s, TileReport&) {
-    const auto place = stencil_.set(k);
+    const auto place = stencil_.set_for_scatter(k);
     if (any(Stencil<P>::outside(place))) strayed_ = true;
     touched_.add(place, k.mass);
     grid::scatter<P>(scratch_.sums, stencil_, lanes, momentum_and_force(i, k, s));

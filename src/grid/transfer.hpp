@@ -8,11 +8,11 @@
 
 namespace breccia::grid {
 
-/// What a gather delivers, lanes = particles: sum w n of the channels of a node, sum w r n of v_new, r in cells.
+/// What a gather delivers, lanes = particles: sum w n of both velocities of the nodes, sum w r n of v_new, r in cells.
 template <class P>
 struct GatheredVelocity {
   using T = typename P::RealPack;
-  T value[kChannels - 1];
+  T updated[3], previous[3];
   T by_x[3], by_y[3], by_z[3];
 };
 
@@ -25,10 +25,19 @@ struct SpreadMomentum {
   T by_x[6], by_y[6], by_z[6];
 };
 
+/// The same pointer, as one register: else the compiler keeps base and index apart and spends an instruction on every
+/// node to add them.
+template <class T>
+BRECCIA_HD T* in_one_register(T* pointer) {
+  asm("" : "+r"(pointer));
+  return pointer;
+}
+
 }  // namespace breccia::grid
 
+#include "grid/gather_fours.hpp"
+#include "grid/scatter_pairs.hpp"
 #include "grid/transfer_nodes.hpp"
-#include "grid/transfer_pairs.hpp"
 
 namespace breccia::grid {
 
@@ -36,15 +45,15 @@ template <class P>
 BRECCIA_HD GatheredVelocity<P> gather(const typename P::Real* nodes, const Stencil<P>& s, int lanes) {
   GatheredVelocity<P> g;
   if constexpr (kNodePairs<P>) {
-    gather_pairs<P>(nodes, s, lanes, g);
+    gather_fours<P>(nodes, s, lanes, g);
   } else {
     gather_nodes<P>(nodes, s, lanes, g);
   }
   // From moments about the nearest node to moments about the particle.
   for (int c = 0; c < 3; ++c) {
-    g.by_x[c] = g.by_x[c] - s.offset[0] * g.value[c];
-    g.by_y[c] = g.by_y[c] - s.offset[1] * g.value[c];
-    g.by_z[c] = g.by_z[c] - s.offset[2] * g.value[c];
+    g.by_x[c] = g.by_x[c] - s.offset[0] * g.updated[c];
+    g.by_y[c] = g.by_y[c] - s.offset[1] * g.updated[c];
+    g.by_z[c] = g.by_z[c] - s.offset[2] * g.updated[c];
   }
   return g;
 }

@@ -19,50 +19,44 @@ template <class P>
 BRECCIA_HD NodeSums<P> gather_lane(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
   using N = Node<P>;
   const typename P::Real* origin = nodes + s.start[lane] * kChannels;
-  const N wx[3] = {N(s.weight[0][0][lane]), N(s.weight[0][1][lane]), N(s.weight[0][2][lane])};
-  N plane[3], plane_x[3], plane_y[3];
+  N value, x, y, first, last;
   for (int k = 0; k < 3; ++k) {
-    N line[3], line_x[3];
-    for (int j = 0; j < 3; ++j) {
-      const typename P::Real* row = origin + tile_index(0, j, k) * kChannels;
-      const N first = wx[0] * N::load(row);
-      const N last = wx[2] * N::load(row + 2 * kTilePlane * kChannels);
-      const N wy(s.weight[1][j][lane]);
-      line[j] = wy * (first + last + wx[1] * N::load(row + kTilePlane * kChannels));
-      line_x[j] = wy * (last - first);
+    N along_x[3], first_y, last_y;
+    for (int i = 0; i < 3; ++i) {
+      const auto node = [&](int j) BRECCIA_INLINE_LAMBDA { return N::load(origin + tile_index(i, j, k) * kChannels); };
+      const N low = N(s.weight_xy[i][0][lane]) * node(0);
+      const N high = N(s.weight_xy[i][2][lane]) * node(2);
+      along_x[i] = (low + high) + N(s.weight_xy[i][1][lane]) * node(1);
+      first_y = i == 0 ? low : first_y + low;
+      last_y = i == 0 ? high : last_y + high;
     }
-    plane[k] = line[0] + line[1] + line[2];
-    plane_y[k] = line[2] - line[0];
-    plane_x[k] = line_x[0] + line_x[1] + line_x[2];
+    const N wz(s.weight_z[k][lane]);
+    const N plane = wz * ((along_x[0] + along_x[2]) + along_x[1]);
+    if (k == 0) first = plane;
+    if (k == 2) last = plane;
+    value = k == 0 ? plane : value + plane;
+    x = k == 0 ? wz * (along_x[2] - along_x[0]) : x + wz * (along_x[2] - along_x[0]);
+    y = k == 0 ? wz * (last_y - first_y) : y + wz * (last_y - first_y);
   }
-  const N wz[3] = {N(s.weight_z[0][lane]), N(s.weight_z[1][lane]), N(s.weight_z[2][lane])};
-  const N first = wz[0] * plane[0];
-  const N last = wz[2] * plane[2];
-  return {first + last + wz[1] * plane[1], wz[0] * plane_x[0] + wz[1] * plane_x[1] + wz[2] * plane_x[2],
-          wz[0] * plane_y[0] + wz[1] * plane_y[1] + wz[2] * plane_y[2], last - first};
+  return {value, x, y, last - first};
 }
 
 template <class P>
 BRECCIA_HD void scatter_lane(typename P::Real* nodes, const Stencil<P>& s, int lane, const NodeSums<P>& q) {
   using N = Node<P>;
   typename P::Real* origin = nodes + s.start[lane] * kChannels;
-  const N wx[3] = {N(s.weight[0][0][lane]), N(s.weight[0][1][lane]), N(s.weight[0][2][lane])};
   const N along_z[3] = {q.value - q.z, q.value, q.value + q.z};
   for (int k = 0; k < 3; ++k) {
     const N wz(s.weight_z[k][lane]);
-    const N plane = wz * along_z[k];
-    const N plane_x = wz * q.x;
-    const N plane_y = wz * q.y;
-    const N along_y[3] = {plane - plane_y, plane, plane + plane_y};
-    for (int j = 0; j < 3; ++j) {
-      const N wy(s.weight[1][j][lane]);
-      const N line = wy * along_y[j];
-      const N line_x = wy * plane_x;
-      const N along_x[3] = {line - line_x, line, line + line_x};
-      typename P::Real* row = origin + tile_index(0, j, k) * kChannels;
-      for (int i = 0; i < 3; ++i) {
-        typename P::Real* node = row + i * kTilePlane * kChannels;
-        (N::load(node) + wx[i] * along_x[i]).store(node);
+    const N middle = wz * along_z[k];
+    const N slope_x = wz * q.x;
+    const N slope_y = wz * q.y;
+    const N along_x[3] = {middle - slope_x, middle, middle + slope_x};
+    for (int i = 0; i < 3; ++i) {
+      const N along_y[3] = {along_x[i] - slope_y, along_x[i], along_x[i] + slope_y};
+      for (int j = 0; j < 3; ++j) {
+        typename P::Real* node = origin + tile_index(i, j, k) * kChannels;
+        (N::load(node) + N(s.weight_xy[i][j][lane]) * along_y[j]).store(node);
       }
     }
   }
@@ -89,7 +83,8 @@ BRECCIA_HD void gather_nodes(const typename P::Real* nodes, const Stencil<P>& s,
   rows_to_channels(value, v);
   rows_to_channels(xy, gxy);
   rows_to_channels(z, gz);
-  g = {{v[0], v[1], v[2], v[3], v[4], v[5], v[6]},
+  g = {{v[0], v[1], v[2]},
+       {v[3], v[4], v[5]},
        {gxy[0], gxy[1], gxy[2]},
        {gxy[4], gxy[5], gxy[6]},
        {gz[0], gz[1], gz[2]}};

@@ -142,9 +142,10 @@ BRECCIA_HD Sym3<T> update_stress(Fx fx, const Constants<R>& k, State<T>& state, 
       const T outside = k.viscosity_in_yield ? zero : trial.viscous;
       const T confining = k.viscosity_in_yield ? pressure : detail::reduce_tension(trial.thermodynamic, damage);
       const T yield = yield_strain(k.strength, confining, damage, melt);
-      const T hencky_norm = T(R(0.5)) * sqrt(squared_norm(twice_hencky));
+      const T hencky_square = T(R(0.25)) * squared_norm(twice_hencky);
       const auto beyond_apex = yield <= zero;
-      if (any((hencky_norm > yield) | beyond_apex)) {
+      if (any((hencky_square > yield * yield) | beyond_apex)) {
+        const T hencky_norm = sqrt(hencky_square);
         const T ratio = min(max(yield, zero) / max(hencky_norm, T(R(1.0e-30))), one);
         const T apex = apex_pressure(k.strength, damage, melt) + outside;
         pressure = select(beyond_apex, apex, pressure);

@@ -20,11 +20,12 @@ BRECCIA_HD T principal_strain(const State<T>& state) {
   return T(R(0.5)) * log1p(largest_eigenvalue(state.total));
 }
 
-/// What principal_strain does not exceed: ln(1 + x) <= x.
+/// False only where principal_strain does not exceed `threshold`: ln(1 + x) <= x. Rounding must not hide a flaw that is
+/// just reached, hence the small share.
 template <class T>
-BRECCIA_HD T principal_strain_bound(const State<T>& state) {
+BRECCIA_HD auto principal_strain_may_exceed(const State<T>& state, T threshold) {
   using R = scalar_of<T>;
-  return T(R(0.5)) * eigenvalue_bound(state.total);
+  return eigenvalue_may_exceed(state.total, T(R(2.0 / 1.0001)) * threshold);
 }
 
 /// c_g / R_s [1/s]: crack speed (a fixed share of the longitudinal wave speed) over the radius of the sphere that has

@@ -57,7 +57,7 @@ BRECCIA_HD Dev3<T> carry_traceless(const Mat3<T>& a, const Dev3<T>& e) {
   using R = scalar_of<T>;
   const Sym3<T> s = carry(a, Sym3<T>{e.xx, e.yy, e.zz(), e.xy, e.xz, e.yz});
   const T mean = (s.xx + s.yy + s.zz) * T(R(1) / R(3));
-  const T inverse = T(R(1)) / max(T(R(1)) + mean, T(R(1.0e-12)));
+  const T inverse = reciprocal(max(T(R(1)) + mean, T(R(1.0e-12))));
   return inverse * Dev3<T>{s.xx - mean, s.yy - mean, s.xy, s.xz, s.yz};
 }
 

@@ -60,15 +60,16 @@ BRECCIA_HD SymmetricEigen<T> symmetric_eigen(Sym3<T> a) {
   return e;
 }
 
-/// A number that no eigenvalue exceeds, at most |dev a| / sqrt(6) above the largest one: without determinant and roots
-/// of the cubic.
+/// False only where no eigenvalue exceeds `limit`; true at the latest where the largest is within |dev a| / sqrt(6) of
+/// it. Without determinant and roots: mean + 2 sqrt(|dev a|^2 / 6) is no less than any eigenvalue.
 template <class T>
-BRECCIA_HD T eigenvalue_bound(const Sym3<T>& a) {
+BRECCIA_HD auto eigenvalue_may_exceed(const Sym3<T>& a, T limit) {
   using R = scalar_of<T>;
   const T mean = (a.xx + a.yy + a.zz) * T(R(1) / R(3));
   const T xx = a.xx - mean, yy = a.yy - mean, zz = a.zz - mean;
   const T half_square = T(R(0.5)) * (xx * xx + yy * yy + zz * zz) + (a.xy * a.xy + a.xz * a.xz + a.yz * a.yz);
-  return mean + T(R(2)) * sqrt(half_square * T(R(1) / R(3)));
+  const T above_mean = limit - mean;
+  return (above_mean < T(R(0))) | (above_mean * above_mean < T(R(4) / R(3)) * half_square);
 }
 
 /// Largest eigenvalue alone, without eigenvectors, accurate relative to |a| however small that is (a few ulp; square

@@ -66,7 +66,7 @@ BRECCIA_HD T yield_strain(const StrengthConstants<R>& k, T kirchhoff_pressure, T
   const T compressive = k.linear_tension ? max(friction, T(R(0))) : friction;
   const T denominator = one + compressive * k.inverse_range;
   const T safe = select(denominator == T(R(0)), T(R(1.0e-6)), denominator);
-  const T intact = melt * (k.cohesion + friction / safe);
+  const T intact = melt * (k.cohesion + friction * reciprocal(safe));
   const T cone = k.damaged_slope * kirchhoff_pressure;
   const T damaged = k.cap_damaged_yield ? min(cone, intact) : cone;
   return (intact + damage * (damaged - intact)) * k.inverse_two_mu;

@@ -40,7 +40,7 @@ template <class T>
 BRECCIA_HD Compression<T> compression_from_volume(T volume_change) {
   using R = scalar_of<T>;
   const T nu = min(volume_change, T(R(1.0 / kLeastEta - 1.0)));
-  const T eta = T(R(1)) / (T(R(1)) + nu);
+  const T eta = reciprocal(T(R(1)) + nu);
   return {eta, -nu * eta, nu};
 }
 
@@ -58,7 +58,7 @@ BRECCIA_HD TillotsonPoint<T> tillotson(const TillotsonConstants<R>& k, const Com
   const T one(R(1)), two(R(2)), three(R(3));
   const T E = max(energy, T(R(0)));
   const T J = one + c.nu;
-  const T inverse_w = one / (one + E * k.inverse_E0 * (J * J));
+  const T inverse_w = reciprocal(one + E * k.inverse_E0 * (J * J));
   const T rho = k.rho0 * c.eta;
   const T thermal = k.b * rho * E * inverse_w;
   const T thermal_by_density = k.b * E * inverse_w * (three - two * inverse_w);

@@ -1,0 +1,97 @@
+// Gather with four nodes per register, four channels each: the velocities of a tile lie in two arrays for it, so that
+// the three nodes of a stencil along z are one load of either (tile_velocities.hpp). Nothing but the weights is the
+// particle's own until the sums over x and y are done.
+#pragma once
+
+#include "grid/stencil.hpp"
+#include "grid/tile_velocities.hpp"
+#include "grid/transfer.hpp"
+#include "grid/transpose.hpp"
+
+namespace breccia::grid {
+
+namespace detail {
+
+/// Sums over the nine columns of a stencil: four nodes along z, four channels each.
+template <class N>
+struct ColumnSums {
+  N value, x, y;  ///< sum w n, and sum w (k - 1) n along x and y
+};
+
+template <class P>
+BRECCIA_HD ColumnSums<FourNodes<P>> sum_columns(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
+  using N = FourNodes<P>;
+  const auto node = [&](int i, int j)
+                        BRECCIA_INLINE_LAMBDA { return N::load(nodes + tile_index(i, j, 0) * kVelocityChannels); };
+  const auto weight = [&](int i, int j) BRECCIA_INLINE_LAMBDA { return N(s.weight_xy[i][j][lane]); };
+  N along_x[3], first, last;
+  for (int i = 0; i < 3; ++i) {
+    const N low = weight(i, 0) * node(i, 0);
+    const N high = weight(i, 2) * node(i, 2);
+    along_x[i] = (low + high) + weight(i, 1) * node(i, 1);
+    first = i == 0 ? low : first + low;
+    last = i == 0 ? high : last + high;
+  }
+  return {(along_x[0] + along_x[2]) + along_x[1], along_x[2] - along_x[0], last - first};
+}
+
+template <class P>
+BRECCIA_HD FourNodes<P> sum_columns_of_values(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
+  using N = FourNodes<P>;
+  N along_x[3];
+  for (int i = 0; i < 3; ++i) {
+    const auto term = [&](int j) BRECCIA_INLINE_LAMBDA {
+      return N(s.weight_xy[i][j][lane]) * N::load(nodes + tile_index(i, j, 0) * kVelocityChannels);
+    };
+    along_x[i] = (term(0) + term(1)) + term(2);
+  }
+  return (along_x[0] + along_x[2]) + along_x[1];
+}
+
+/// Quarters of two registers, one after the other.
+template <int a, int b, int c, int d, class N>
+BRECCIA_HD N quarters(N first, N second) {
+  constexpr int kA = 4 * a, kB = 4 * b, kC = 16 + 4 * c, kD = 16 + 4 * d;
+  return N(__builtin_shufflevector(first.v, second.v, kA, kA + 1, kA + 2, kA + 3, kB, kB + 1, kB + 2, kB + 3, kC,
+                                   kC + 1, kC + 2, kC + 3, kD, kD + 1, kD + 2, kD + 3));
+}
+
+/// One particle's row, by quarters: v_new and x of v_old; its slope along z; along x and y of v_old; along y and z of
+/// v_old.
+template <class P>
+BRECCIA_HD FourNodes<P> gather_row(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
+  using N = FourNodes<P>;
+  using Real = typename P::Real;
+  const auto* origin = in_one_register(nodes + s.start[lane] * kVelocityChannels);
+  const ColumnSums<N> sums = sum_columns<P>(origin, s, lane);
+  const N rest = sum_columns_of_values<P>(origin + kTileNodes * kVelocityChannels, s, lane);
+  // The fourth channel's slopes nobody needs.
+  const N x(__builtin_shufflevector(sums.x.v, rest.v, 0, 1, 2, 19, 4, 5, 6, 23, 8, 9, 10, 27, 12, 13, 14, 31));
+  const N y(__builtin_shufflevector(sums.y.v, rest.v, 0, 1, 2, 16, 4, 5, 6, 20, 8, 9, 10, 24, 12, 13, 14, 28));
+  const N low = quarters<0, 1, 0, 1>(x, y);
+  const N high = quarters<2, 3, 2, 3>(x, y);
+  alignas(64) static constexpr Real kFirst[16] = {1, 1, 1, 1, -1, -1, -1, -1, 1, 1, 1, 1, 1, 1, 1, 1};
+  alignas(64) static constexpr Real kMiddle[16] = {1, 1, 1, 1, 0, 0, 0, 0, 1, 1, 1, 1, 1, 1, 1, 1};
+  const N first = N(s.weight_z[0][lane]) * N::load(kFirst);
+  const N middle = N(s.weight_z[1][lane]) * N::load(kMiddle);
+  return first * quarters<0, 0, 0, 2>(sums.value, low) + middle * quarters<1, 1, 1, 3>(sums.value, low) +
+         N(s.weight_z[2][lane]) * quarters<2, 2, 0, 2>(sums.value, high);
+}
+
+}  // namespace detail
+
+template <class P>
+BRECCIA_HD void gather_fours(const typename P::Real* nodes, const Stencil<P>& s, int lanes, GatheredVelocity<P>& g) {
+  static_assert(P::kLanes == 4 * kVelocityChannels);
+  FourNodes<P> row[P::kLanes];
+  for (int l = 0; l < lanes; ++l) row[l] = detail::gather_row<P>(nodes, s, l);
+  for (int l = lanes; l < P::kLanes; ++l) row[l] = FourNodes<P>(typename P::Real(0));
+  transpose16(row);
+  g = {{row[0], row[1], row[2]},
+       {row[3], row[11], row[15]},
+       {row[8], row[9], row[10]},
+       {row[12], row[13], row[14]},
+       {row[4], row[5], row[6]}};
+}
+
+}  // namespace breccia::grid

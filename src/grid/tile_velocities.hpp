@@ -1,0 +1,45 @@
+// How the velocities of the nodes lie in a tile. Where two nodes of a block fill a register, the tile holds them in two
+// arrays of four channels: v_new with x of v_old, and y and z of v_old with the mass (gather_fours.hpp). Else a node
+// keeps its channels together, as in the blocks.
+#pragma once
+
+#include "grid/tile.hpp"
+
+namespace breccia::grid {
+
+/// Two nodes that follow each other along z fill a register: transfers take several at once.
+template <class P>
+inline constexpr bool kNodePairs = static_cast<int>(sizeof(typename P::Real)) * 2 * kChannels == kRegisterBytes;
+
+template <class P>
+using TwoNodes = Pack<typename P::Real, 2 * kChannels>;
+
+/// Of a node in either array.
+inline constexpr int kVelocityChannels = 4;
+
+/// Four nodes along z of one array.
+template <class P>
+using FourNodes = Pack<typename P::Real, 4 * kVelocityChannels>;
+
+/// Where the mass of node n of the tile lies in its velocities.
+template <class P>
+constexpr int place_of_mass(int n) {
+  if constexpr (kNodePairs<P>) return (kTileNodes + n) * kVelocityChannels + 2;
+  return n * kChannels + kMass;
+}
+
+/// Puts two nodes, n and n + 1, as they lie in a block into the velocities of a tile.
+template <class P>
+BRECCIA_HD void put_velocities(TwoNodes<P> two, int n, typename P::Real* nodes) {
+  if constexpr (kNodePairs<P>) {
+    using Half = Pack<typename P::Real, kChannels>;
+    const Half moving(__builtin_shufflevector(two.v, two.v, 0, 1, 2, 3, 8, 9, 10, 11));
+    const Half rest(__builtin_shufflevector(two.v, two.v, 5, 7, 6, 4, 13, 15, 14, 12));
+    moving.store(nodes + n * kVelocityChannels);
+    rest.store(nodes + (kTileNodes + n) * kVelocityChannels);
+  } else {
+    two.store(nodes + n * kChannels);
+  }
+}
+
+}  // namespace breccia::grid
