@@ -47,6 +47,27 @@ TYPED_TEST(SymmetricEigenproblem, LargestEigenvalueOfDegenerateTensors) {
   EXPECT_NEAR(double(largest_eigenvalue(Sym3<R>{-c, R(0), R(0), R(0), R(0), R(0)})), 0.0, root * double(c));
 }
 
+TYPED_TEST(SymmetricEigenproblem, NoEigenvalueBeyondALimitIsMissed) {
+  using R = TypeParam;
+  const double epsilon = double(std::numeric_limits<R>::epsilon());
+  std::mt19937_64 engine(3);
+  int passed_over = 0;
+  for (const double size : {1e-6, 1.0})
+    for (int i = 0; i < 2000; ++i) {
+      const Matrix3d raw = random_matrix(engine, size);
+      const Sym3<R> a = to_sym3<R>(0.5 * (raw + raw.transpose()));
+      const Matrix3d exact = to_eigen(a);
+      const double largest = Eigen::SelfAdjointEigenSolver<Matrix3d>(exact).eigenvalues()(2);
+      // Rounding of the mean and of the squares, a few ulp of the norm.
+      const double rounding = 20.0 * epsilon * exact.norm();
+      EXPECT_TRUE(eigenvalue_may_exceed(a, R(largest - rounding)));
+      EXPECT_TRUE(eigenvalue_may_exceed(a, R(-2.0 * exact.norm())));
+      EXPECT_FALSE(eigenvalue_may_exceed(a, R(largest + deviator(exact).norm() / std::sqrt(6.0) + rounding)));
+      passed_over += eigenvalue_may_exceed(a, R(largest + 0.9 * deviator(exact).norm() / std::sqrt(6.0))) ? 0 : 1;
+    }
+  EXPECT_GT(passed_over, 1000) << "the bound is no use";
+}
+
 TYPED_TEST(SymmetricEigenproblem, JacobiRebuildsTheTensorFromOrthonormalVectors) {
   using R = TypeParam;
   const double epsilon = double(std::numeric_limits<R>::epsilon());
