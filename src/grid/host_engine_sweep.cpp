@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "grid/host_engine.hpp"
+#include "grid/sweep_board.hpp"
 
 namespace breccia::grid {
 
@@ -11,7 +12,7 @@ void HostEngine<P>::run_task(const SweepTask& task, const PassArguments<P>& argu
                              std::vector<TileReport>& reports) {
   // Tiles between two looks at the messages: some ten microseconds.
   constexpr std::uint32_t kStretch = 8;
-  for (const SweepStep& step : task) {
+  for (const SweepStep& step : task.steps) {
     for (std::uint32_t n = step.first; n < step.last; ++n) {
       if (!step.update) {
         const std::uint32_t tile = sweep_.order[n];
@@ -42,6 +43,7 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
   const auto begin = Timeline::Clock::now();
   auto boundary_done = begin;
   const bool early = arguments.scatter && setup_.numerics.overlap;
+  SweepBoard board(sweep_.interior);
 #pragma omp parallel num_threads(setup_.threads)
   {
     for (const SweepPhase& phase : sweep_.boundary) {
@@ -58,9 +60,14 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
       const auto first = static_cast<std::uint32_t>(n) * kChunk;
       kernels_.lone_pass(arguments, first, std::min(first + kChunk, lone_packs), lone_reports[n]);
     }
-    for (const SweepPhase& phase : sweep_.interior) {
-#pragma omp for schedule(dynamic, 1)
-      for (const SweepTask& task : phase) run_task(task, arguments, trailing, reports);
+    for (std::size_t p = 0; p < sweep_.interior.size(); ++p) {
+      const SweepPhase& phase = sweep_.interior[p];
+#pragma omp for schedule(dynamic, 1) nowait
+      for (std::size_t n = 0; n < phase.size(); ++n) {
+        board.wait_for_turn(p, phase[n]);
+        run_task(phase[n], arguments, trailing, reports);
+        board.finish(p, n);
+      }
     }
   }
   note("boundary tiles", Timeline::Lane::kTiles, begin, boundary_done);

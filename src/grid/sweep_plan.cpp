@@ -34,19 +34,23 @@ std::vector<Plane> planes_of(std::span<const BlockKey> tiles, std::span<const ch
   return planes;
 }
 
-// One phase for each turn; nothing trails.
+// One phase for each turn, all of which comes after the turn before; nothing trails.
 std::vector<SweepPhase> sweep_by_turns(const std::vector<Plane>& planes, std::int32_t period) {
   std::vector<SweepPhase> phases(3);
   for (const Plane& p : planes) {
     if (p.first_in_order == p.last_in_order) continue;
-    phases[static_cast<std::size_t>(sweep_turn(p.x, period))].push_back({{p.first_in_order, p.last_in_order, false}});
+    const SweepStep pass{p.first_in_order, p.last_in_order, false};
+    phases[static_cast<std::size_t>(sweep_turn(p.x, period))].push_back({.steps = {pass}});
   }
   std::erase_if(phases, [](const SweepPhase& phase) { return phase.empty(); });
+  for (std::size_t n = 1; n < phases.size(); ++n) {
+    for (SweepTask& task : phases[n]) task.after_last = phases[n - 1].size();
+  }
   return phases;
 }
 
-// Chunks of planes that begin with an even one. The odd plane at the end of a chunk waits for the even one behind it,
-// which is the first of the next chunk: second phase.
+// Chunks of planes that begin with an even one. The odd plane at the end of a chunk comes after the even one behind it,
+// which is the first of the next chunk: second phase, the tasks of which fill the time until all chunks are done.
 class ChunkedSweep {
  public:
   ChunkedSweep(const std::vector<Plane>& planes, std::uint32_t tiles_per_chunk) : planes_(planes) {
@@ -72,15 +76,17 @@ class ChunkedSweep {
     SweepTask task;
     for (std::size_t n = first; n < last; ++n) {
       if (odd(n) && next_to_each_other(n)) continue;  // its turn comes after the even plane behind it
-      task.push_back(pass(n));
+      task.steps.push_back(pass(n));
       const bool odd_before = n > first && odd(n - 1) && next_to_each_other(n - 1);
       if (odd(n)) update_around(task, n, first);
       if (!odd(n) && odd_before) {
-        task.push_back(pass(n - 1));
+        task.steps.push_back(pass(n - 1));
         update_around(task, n - 1, first);
       }
     }
-    if (odd(last - 1) && next_to_each_other(last - 1)) late_.push_back({pass(last - 1)});
+    if (odd(last - 1) && next_to_each_other(last - 1)) {
+      late_.push_back({.steps = {pass(last - 1)}, .after_first = chunks_.size(), .after_last = chunks_.size() + 2});
+    }
     chunks_.push_back(std::move(task));
   }
 
@@ -89,8 +95,8 @@ class ChunkedSweep {
   void update_around(SweepTask& task, std::size_t n, std::size_t first) const {
     const bool has_before = n > first && next_to_each_other(n - 1);
     const bool complete = has_before && (n - 1 > first || n - 1 == 0 || !next_to_each_other(n - 2));
-    if (complete) task.push_back(update(n - 1));
-    task.push_back(update(n));
+    if (complete) task.steps.push_back(update(n - 1));
+    task.steps.push_back(update(n));
   }
 
   [[nodiscard]] SweepStep pass(std::size_t n) const {
@@ -116,7 +122,7 @@ Sweep plan_sweep(std::span<const BlockKey> tiles, std::span<const char> boundary
     return sweep;
   }
   // Several chunks for each thread even out what a tile costs.
-  const std::uint32_t chunks = threads == 1 ? 1U : 4U * static_cast<std::uint32_t>(threads);
+  const std::uint32_t chunks = threads == 1 ? 1U : 6U * static_cast<std::uint32_t>(threads);
   const auto interior_tiles = static_cast<std::uint32_t>(tiles.size()) - boundary_tiles;
   sweep.interior = ChunkedSweep(planes, interior_tiles / chunks + 1).phases();
   return sweep;

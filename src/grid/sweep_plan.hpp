@@ -1,6 +1,7 @@
 // In which order the tiles of a rank are passed over, by which thread, and when the grid update trails behind.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -15,8 +16,12 @@ struct SweepStep {
   std::uint32_t first, last;
   bool update;
 };
-/// Steps that one thread does in this order.
-using SweepTask = std::vector<SweepStep>;
+/// Steps that one thread does in this order, once the tasks after_first .. after_last-1 of the phase before are done.
+struct SweepTask {
+  std::vector<SweepStep> steps;
+  std::size_t after_first = 0;
+  std::size_t after_last = 0;
+};
 /// Tasks that may run at once.
 using SweepPhase = std::vector<SweepTask>;
 
