@@ -12,37 +12,71 @@ namespace breccia::grid {
 
 namespace detail {
 
+/// The nodes of a stencil in memory: of each column four nodes along z, four channels of v_new (with x of v_old) and
+/// the rest of v_old.
+template <class P>
+class NodesInMemory {
+  using N = FourNodes<P>;
+
+ public:
+  BRECCIA_HD NodesInMemory(const typename P::Real* nodes, int start)
+      : origin_(in_one_register(nodes + start * kVelocityChannels)) {}
+  BRECCIA_HD N moving(int i, int j) const { return N::load(origin_ + tile_index(i, j, 0) * kVelocityChannels); }
+  BRECCIA_HD N rest(int i, int j) const {
+    return N::load(origin_ + (kTileNodes + tile_index(i, j, 0)) * kVelocityChannels);
+  }
+
+ private:
+  const typename P::Real* origin_;
+};
+
+/// The same in registers, for several particles of one stencil.
+template <class P>
+class NodesInRegisters {
+  using N = FourNodes<P>;
+
+ public:
+  BRECCIA_HD explicit NodesInRegisters(const NodesInMemory<P>& nodes) {
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) {
+        moving_[i][j] = nodes.moving(i, j);
+        rest_[i][j] = nodes.rest(i, j);
+      }
+    }
+  }
+  BRECCIA_HD N moving(int i, int j) const { return moving_[i][j]; }
+  BRECCIA_HD N rest(int i, int j) const { return rest_[i][j]; }
+
+ private:
+  N moving_[3][3], rest_[3][3];
+};
+
 /// Sums over the nine columns of a stencil: four nodes along z, four channels each.
 template <class N>
 struct ColumnSums {
   N value, x, y;  ///< sum w n, and sum w (k - 1) n along x and y
 };
 
-template <class P>
-BRECCIA_HD ColumnSums<FourNodes<P>> sum_columns(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
+template <class P, class Nodes>
+BRECCIA_HD ColumnSums<FourNodes<P>> sum_moving(const Nodes& nodes, const Stencil<P>& s, int lane) {
   using N = FourNodes<P>;
-  const auto node = [&](int i, int j)
-                        BRECCIA_INLINE_LAMBDA { return N::load(nodes + tile_index(i, j, 0) * kVelocityChannels); };
   const auto weight = [&](int i, int j) BRECCIA_INLINE_LAMBDA { return N(s.weight_xy[i][j][lane]); };
-  N along_x[3], first, last;
+  N low[3], high[3], along_x[3];
   for (int i = 0; i < 3; ++i) {
-    const N low = weight(i, 0) * node(i, 0);
-    const N high = weight(i, 2) * node(i, 2);
-    along_x[i] = (low + high) + weight(i, 1) * node(i, 1);
-    first = i == 0 ? low : first + low;
-    last = i == 0 ? high : last + high;
+    low[i] = weight(i, 0) * nodes.moving(i, 0);
+    high[i] = weight(i, 2) * nodes.moving(i, 2);
+    along_x[i] = (low[i] + high[i]) + weight(i, 1) * nodes.moving(i, 1);
   }
-  return {(along_x[0] + along_x[2]) + along_x[1], along_x[2] - along_x[0], last - first};
+  return {(along_x[0] + along_x[2]) + along_x[1], along_x[2] - along_x[0],
+          (high[0] + high[1] + high[2]) - (low[0] + low[1] + low[2])};
 }
 
-template <class P>
-BRECCIA_HD FourNodes<P> sum_columns_of_values(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
+template <class P, class Nodes>
+BRECCIA_HD FourNodes<P> sum_rest(const Nodes& nodes, const Stencil<P>& s, int lane) {
   using N = FourNodes<P>;
   N along_x[3];
   for (int i = 0; i < 3; ++i) {
-    const auto term = [&](int j) BRECCIA_INLINE_LAMBDA {
-      return N(s.weight_xy[i][j][lane]) * N::load(nodes + tile_index(i, j, 0) * kVelocityChannels);
-    };
+    const auto term = [&](int j) BRECCIA_INLINE_LAMBDA { return N(s.weight_xy[i][j][lane]) * nodes.rest(i, j); };
     along_x[i] = (term(0) + term(1)) + term(2);
   }
   return (along_x[0] + along_x[2]) + along_x[1];
@@ -58,13 +92,12 @@ BRECCIA_HD N quarters(N first, N second) {
 
 /// One particle's row, by quarters: v_new and x of v_old; its slope along z; along x and y of v_old; along y and z of
 /// v_old.
-template <class P>
-BRECCIA_HD FourNodes<P> gather_row(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
+template <class P, class Nodes>
+BRECCIA_HD FourNodes<P> gather_row(const Nodes& nodes, const Stencil<P>& s, int lane) {
   using N = FourNodes<P>;
   using Real = typename P::Real;
-  const auto* origin = in_one_register(nodes + s.start[lane] * kVelocityChannels);
-  const ColumnSums<N> sums = sum_columns<P>(origin, s, lane);
-  const N rest = sum_columns_of_values<P>(origin + kTileNodes * kVelocityChannels, s, lane);
+  const ColumnSums<N> sums = sum_moving<P>(nodes, s, lane);
+  const N rest = sum_rest<P>(nodes, s, lane);
   // The fourth channel's slopes nobody needs.
   const N x(__builtin_shufflevector(sums.x.v, rest.v, 0, 1, 2, 19, 4, 5, 6, 23, 8, 9, 10, 27, 12, 13, 14, 31));
   const N y(__builtin_shufflevector(sums.y.v, rest.v, 0, 1, 2, 16, 4, 5, 6, 20, 8, 9, 10, 24, 12, 13, 14, 28));
@@ -78,13 +111,33 @@ BRECCIA_HD FourNodes<P> gather_row(const typename P::Real* nodes, const Stencil<
          N(s.weight_z[2][lane]) * quarters<2, 2, 0, 2>(sums.value, high);
 }
 
+template <class P>
+BRECCIA_HD void gather_each(const typename P::Real* nodes, const Stencil<P>& s, int lanes, FourNodes<P>* row) {
+  for (int l = 0; l < lanes; ++l) row[l] = gather_row<P>(NodesInMemory<P>(nodes, s.start[l]), s, l);
+}
+
+/// The same where neighbours mostly share their stencil: its nodes are read once for all of them.
+template <class P>
+BRECCIA_HD void gather_runs(const typename P::Real* nodes, const Stencil<P>& s, int lanes, FourNodes<P>* row) {
+  NodesInRegisters<P> here(NodesInMemory<P>(nodes, s.start[0]));
+  for (int l = 0;;) {
+    row[l] = gather_row<P>(here, s, l);
+    if (++l == lanes) return;
+    if (s.start[l] != s.start[l - 1]) here = NodesInRegisters<P>(NodesInMemory<P>(nodes, s.start[l]));
+  }
+}
+
 }  // namespace detail
 
 template <class P>
 BRECCIA_HD void gather_fours(const typename P::Real* nodes, const Stencil<P>& s, int lanes, GatheredVelocity<P>& g) {
   static_assert(P::kLanes == 4 * kVelocityChannels);
   FourNodes<P> row[P::kLanes];
-  for (int l = 0; l < lanes; ++l) row[l] = detail::gather_row<P>(nodes, s, l);
+  if (mostly_shared(s, lanes)) {
+    detail::gather_runs<P>(nodes, s, lanes, row);
+  } else {
+    detail::gather_each<P>(nodes, s, lanes, row);
+  }
   for (int l = lanes; l < P::kLanes; ++l) row[l] = FourNodes<P>(typename P::Real(0));
   transpose16(row);
   g = {{row[0], row[1], row[2]},

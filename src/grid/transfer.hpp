@@ -33,6 +33,15 @@ BRECCIA_HD T* in_one_register(T* pointer) {
   return pointer;
 }
 
+/// Whether most particles of a pack have the stencil of the one before them. The end of a run is a branch nobody can
+/// predict: runs must be long for it to pay.
+template <class P>
+BRECCIA_HD bool mostly_shared(const Stencil<P>& s, int lanes) {
+  int shared = 0;
+  for (int l = 1; l < lanes; ++l) shared += s.start[l] == s.start[l - 1] ? 1 : 0;
+  return shared >= P::kLanes * 5 / 8;
+}
+
 }  // namespace breccia::grid
 
 #include "grid/gather_fours.hpp"

@@ -19,45 +19,52 @@ template <class P>
 BRECCIA_HD NodeSums<P> gather_lane(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
   using N = Node<P>;
   const typename P::Real* origin = nodes + s.start[lane] * kChannels;
-  N value, x, y, first, last;
+  N plane[3], plane_x[3], plane_y[3];
   for (int k = 0; k < 3; ++k) {
-    N along_x[3], first_y, last_y;
+    N low[3], high[3], along_x[3];
     for (int i = 0; i < 3; ++i) {
-      const auto node = [&](int j) BRECCIA_INLINE_LAMBDA { return N::load(origin + tile_index(i, j, k) * kChannels); };
-      const N low = N(s.weight_xy[i][0][lane]) * node(0);
-      const N high = N(s.weight_xy[i][2][lane]) * node(2);
-      along_x[i] = (low + high) + N(s.weight_xy[i][1][lane]) * node(1);
-      first_y = i == 0 ? low : first_y + low;
-      last_y = i == 0 ? high : last_y + high;
+      const auto term = [&](int j) BRECCIA_INLINE_LAMBDA {
+        return N(s.weight_xy[i][j][lane]) * N::load(origin + tile_index(i, j, k) * kChannels);
+      };
+      low[i] = term(0);
+      high[i] = term(2);
+      along_x[i] = (low[i] + high[i]) + term(1);
     }
     const N wz(s.weight_z[k][lane]);
-    const N plane = wz * ((along_x[0] + along_x[2]) + along_x[1]);
-    if (k == 0) first = plane;
-    if (k == 2) last = plane;
-    value = k == 0 ? plane : value + plane;
-    x = k == 0 ? wz * (along_x[2] - along_x[0]) : x + wz * (along_x[2] - along_x[0]);
-    y = k == 0 ? wz * (last_y - first_y) : y + wz * (last_y - first_y);
+    plane[k] = wz * ((along_x[0] + along_x[2]) + along_x[1]);
+    plane_x[k] = wz * (along_x[2] - along_x[0]);
+    plane_y[k] = wz * ((high[0] + high[1] + high[2]) - (low[0] + low[1] + low[2]));
   }
-  return {value, x, y, last - first};
+  return {(plane[0] + plane[2]) + plane[1], (plane_x[0] + plane_x[2]) + plane_x[1],
+          (plane_y[0] + plane_y[2]) + plane_y[1], plane[2] - plane[0]};
 }
 
+/// Lanes `first` to `last` - 1, which have one stencil: its nodes are read and written once for all of them, as reading
+/// what has just been written is slow. `rows`: value and slopes along x, y, z of each lane.
 template <class P>
-BRECCIA_HD void scatter_lane(typename P::Real* nodes, const Stencil<P>& s, int lane, const NodeSums<P>& q) {
+BRECCIA_HD void scatter_run(typename P::Real* nodes, const Stencil<P>& s, int first, int last,
+                            const Node<P> (&rows)[4][P::kLanes]) {
   using N = Node<P>;
-  typename P::Real* origin = nodes + s.start[lane] * kChannels;
-  const N along_z[3] = {q.value - q.z, q.value, q.value + q.z};
   for (int k = 0; k < 3; ++k) {
-    const N wz(s.weight_z[k][lane]);
-    const N middle = wz * along_z[k];
-    const N slope_x = wz * q.x;
-    const N slope_y = wz * q.y;
-    const N along_x[3] = {middle - slope_x, middle, middle + slope_x};
+    typename P::Real* origin = in_one_register(nodes + (s.start[first] + tile_index(0, 0, k)) * kChannels);
+    N sum[3][3];
     for (int i = 0; i < 3; ++i) {
-      const N along_y[3] = {along_x[i] - slope_y, along_x[i], along_x[i] + slope_y};
-      for (int j = 0; j < 3; ++j) {
-        typename P::Real* node = origin + tile_index(i, j, k) * kChannels;
-        (N::load(node) + N(s.weight_xy[i][j][lane]) * along_y[j]).store(node);
+      for (int j = 0; j < 3; ++j) sum[i][j] = N::load(origin + tile_index(i, j, 0) * kChannels);
+    }
+    for (int l = first; l < last; ++l) {
+      const N wz(s.weight_z[k][l]);
+      const N middle = wz * (rows[0][l] + N(typename P::Real(k - 1)) * rows[3][l]);
+      const N slope_x = wz * rows[1][l];
+      const N slope_y = wz * rows[2][l];
+      const N along_x[3] = {middle - slope_x, middle, middle + slope_x};
+      for (int i = 0; i < 3; ++i) {
+        sum[i][0] += N(s.weight_xy[i][0][l]) * (along_x[i] - slope_y);
+        sum[i][1] += N(s.weight_xy[i][1][l]) * along_x[i];
+        sum[i][2] += N(s.weight_xy[i][2][l]) * (along_x[i] + slope_y);
       }
+    }
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) sum[i][j].store(origin + tile_index(i, j, 0) * kChannels);
     }
   }
 }
@@ -103,8 +110,13 @@ BRECCIA_HD void scatter_nodes(typename P::Real* nodes, const Stencil<P>& s, int 
   channels_to_rows(x, rows[1]);
   channels_to_rows(y, rows[2]);
   channels_to_rows(z, rows[3]);
-  for (int l = 0; l < lanes; ++l) {
-    detail::scatter_lane<P>(nodes, s, l, {rows[0][l], rows[1][l], rows[2][l], rows[3][l]});
+  if (mostly_shared(s, lanes)) {
+    for (int first = 0, last = 0; first < lanes; first = last) {
+      while (last < lanes && s.start[last] == s.start[first]) ++last;
+      detail::scatter_run<P>(nodes, s, first, last, rows);
+    }
+  } else {
+    for (int l = 0; l < lanes; ++l) detail::scatter_run<P>(nodes, s, l, l + 1, rows);
   }
 }
 
