@@ -17,7 +17,7 @@ BRECCIA_HD double abs(double a) { return a < 0 ? -a : a; }
 BRECCIA_HD float abs(float a) { return a < 0 ? -a : a; }
 BRECCIA_HD double sqrt(double a) { return ::sqrt(a); }
 BRECCIA_HD float sqrt(float a) { return ::sqrtf(a); }
-/// 1 / a, to an ulp or two where the processor has a faster way than dividing; a finite and not 0.
+/// 1 / a, to an ulp or two where the processor has a faster way than dividing; `a` normal and below 2^126.
 BRECCIA_HD double reciprocal(double a) { return 1.0 / a; }
 BRECCIA_HD float reciprocal(float a) { return 1.0F / a; }
 BRECCIA_HD bool any(bool m) { return m; }

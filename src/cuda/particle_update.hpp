@@ -191,7 +191,6 @@ BRECCIA_HD void grow_damage(const PassArguments<Real>& a, unsigned slot, Real ma
                             material::State<Real>& s) {
   std::int32_t count = a.particles.flaw_count[slot];
   const Real next = a.particles.next_threshold[slot];
-  // Rounding must not hide a flaw that is just reached, hence the small share.
   if (material::principal_strain_may_exceed(s, next)) {
     const Real strain = material::principal_strain(s);
     if (strain > next) count = activate_flaws(a, slot, strain, count);

@@ -12,6 +12,9 @@ namespace breccia::grid {
 
 namespace detail {
 
+// The last load of a stencil takes a node more than the stencil has.
+static_assert(tile_index(kTileWidth - 1, kTileWidth - 1, kTileHeight - 3) + 4 <= kTileNodes);
+
 /// The nodes of a stencil in memory: of each column four nodes along z, four channels of v_new (with x of v_old) and
 /// the rest of v_old.
 template <class P>
@@ -98,7 +101,7 @@ BRECCIA_HD FourNodes<P> gather_row(const Nodes& nodes, const Stencil<P>& s, int 
   using Real = typename P::Real;
   const ColumnSums<N> sums = sum_moving<P>(nodes, s, lane);
   const N rest = sum_rest<P>(nodes, s, lane);
-  // The fourth channel's slopes nobody needs.
+  // Slopes of the fourth channel nobody needs: the rest of v_old takes their place (RestChannel).
   const N x(__builtin_shufflevector(sums.x.v, rest.v, 0, 1, 2, 19, 4, 5, 6, 23, 8, 9, 10, 27, 12, 13, 14, 31));
   const N y(__builtin_shufflevector(sums.y.v, rest.v, 0, 1, 2, 16, 4, 5, 6, 20, 8, 9, 10, 24, 12, 13, 14, 28));
   const N low = quarters<0, 1, 0, 1>(x, y);

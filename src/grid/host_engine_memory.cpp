@@ -36,7 +36,7 @@ void HostEngine<P>::hold_sums() {
 
 template <class P>
 void HostEngine<P>::hold_velocities() {
-  // Read are velocities of nodes that a scatter has reached since, and with weight 0 those beside them.
+  // Read are velocities of nodes that a scatter has reached since; copied are those beside them, too.
   hold(velocities_, blocks_.size());
 }
 

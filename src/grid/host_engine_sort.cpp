@@ -15,8 +15,8 @@ constexpr std::int32_t floor_div4(std::int32_t n) { return n >> 2; }
 // Cells from the lowest of a stack.
 struct CellInStack {
   int x, y, z;
-  // In storage order: z slowest, by pairs of cells whose stencils begin at the same pair of nodes (transfer_pairs.hpp),
-  // so that particles that follow each other mostly share their stencil.
+  // In storage order: layers of two cells along z, whose stencils begin at the same pair of nodes (scatter_pairs.hpp);
+  // in a layer columns, in a column its two cells. So particles that follow each other mostly share their stencil.
   [[nodiscard]] constexpr std::uint32_t index() const {
     const int pair = (z + 1) / 2;
     const int column = y * kBlockWidth + x;

@@ -60,6 +60,8 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
       const auto first = static_cast<std::uint32_t>(n) * kChunk;
       kernels_.lone_pass(arguments, first, std::min(first + kChunk, lone_packs), lone_reports[n]);
     }
+    // A thread leaves a phase only when all its tasks have been taken: what it waits for later is being done by others,
+    // who wait for nothing behind it.
     for (std::size_t p = 0; p < sweep_.interior.size(); ++p) {
       const SweepPhase& phase = sweep_.interior[p];
 #pragma omp for schedule(dynamic, 1) nowait

@@ -99,7 +99,7 @@ BRECCIA_HD void update_nodes_at(const NodeArguments<P>& a, std::size_t first) {
   Real* sums = a.sums + first * kChannels;
   Real* velocities = a.velocities + first * kChannels;
   if constexpr (kNodePairs<P>) {
-    using N = Pack<Real, 2 * kChannels>;
+    using N = TwoNodes<P>;
     const N values = N::load(sums);
     N(Real(0)).store(sums);
     const N mass = rearranged<6, 6, 6, 6, 6, 6, 6, 6>(values);

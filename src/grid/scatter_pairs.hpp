@@ -2,6 +2,9 @@
 // cache line; a fourth node has weight 0.
 #pragma once
 
+#include <type_traits>
+#include <utility>
+
 #include "grid/stencil.hpp"
 #include "grid/transfer.hpp"
 #include "grid/transpose.hpp"

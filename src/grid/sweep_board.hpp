@@ -17,8 +17,8 @@ class SweepBoard {
     for (const SweepPhase& phase : phases) done_.emplace_back(phase.size());
   }
 
-  /// Returns once those tasks of the phase before are done that `task` comes after. They must have been begun, or be
-  /// next in line for other threads.
+  /// Returns once those tasks of the phase before are done that `task` comes after. Some thread must have taken each of
+  /// them before.
   void wait_for_turn(std::size_t phase, const SweepTask& task) const {
     for (std::size_t n = task.after_first; n < task.after_last; ++n) {
       while (!done_[phase - 1][n].load(std::memory_order_acquire)) std::this_thread::yield();

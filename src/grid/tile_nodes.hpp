@@ -1,4 +1,4 @@
-// Copies between blocks and the nodes of a tile that stay in the first-level cache. Only the box that particles
+// Copies between blocks and the nodes of a tile, whose layers fit the first-level cache. Only the box that particles
 // touch is copied, along z by pairs of nodes: a pair is a cache line in mixed precision and never crosses blocks.
 #pragma once
 

@@ -1,4 +1,4 @@
-// The pass over one tile: its nodes to the first-level cache, G2P and P2G there, sums back to the blocks.
+// The pass over one tile: its nodes from the blocks, G2P and P2G on them, sums back to the blocks.
 #pragma once
 
 #include "grid/pack_pass.hpp"

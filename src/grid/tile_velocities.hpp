@@ -1,5 +1,5 @@
 // How the velocities of the nodes lie in a tile. Where two nodes of a block fill a register, the tile holds them in two
-// arrays of four channels: v_new with x of v_old, and y and z of v_old with the mass (gather_fours.hpp). Else a node
+// arrays of four channels: v_new with x of v_old, and [z of v_old, 0, mass, y of v_old] (gather_fours.hpp). Else a node
 // keeps its channels together, as in the blocks.
 #pragma once
 
@@ -17,14 +17,18 @@ using TwoNodes = Pack<typename P::Real, 2 * kChannels>;
 /// Of a node in either array.
 inline constexpr int kVelocityChannels = 4;
 
+/// Channels of the second array. y of v_old is last, where the first array has a channel whose slopes nobody needs: it
+/// takes the place of one of them without being moved.
+enum RestChannel { kRestOldZ = 0, kRestMass = 2, kRestOldY = 3 };
+
 /// Four nodes along z of one array.
 template <class P>
 using FourNodes = Pack<typename P::Real, 4 * kVelocityChannels>;
 
 /// Where the mass of node n of the tile lies in its velocities.
 template <class P>
-constexpr int place_of_mass(int n) {
-  if constexpr (kNodePairs<P>) return (kTileNodes + n) * kVelocityChannels + 2;
+BRECCIA_HD constexpr int place_of_mass(int n) {
+  if constexpr (kNodePairs<P>) return (kTileNodes + n) * kVelocityChannels + kRestMass;
   return n * kChannels + kMass;
 }
 

@@ -1,7 +1,8 @@
 // Between the nodes of a tile and a pack of particles. Node channels lie in lanes, particles are taken one after the
-// other, and the sums over the 27 nodes are separable: a gather contracts x, y, z, a scatter expands z, y, x
-// (cpu_limit.md 2). First moments are taken about the nearest node, where they cost a difference of two terms. Nodes
-// are taken by pairs where two fill a register, else one by one.
+// other. The sums over the 27 nodes are taken over the nine columns first, whose weights are products made for all
+// lanes at once, and then along z; a scatter goes the other way. First moments are taken about the nearest node, where
+// they cost a difference of two terms. Where two nodes fill a register a gather takes four of half the channels and a
+// scatter pairs, else both take nodes one by one.
 #pragma once
 
 #include "grid/stencil.hpp"

@@ -94,15 +94,6 @@ BRECCIA_HD void transpose16(Pack<S, 16> (&row)[16]) {
   }
 }
 
-/// Lower halves of a and b, plus their upper halves.
-template <class S>
-BRECCIA_HD Pack<S, 16> joined_halves(Pack<S, 16> a, Pack<S, 16> b) {
-  const Pack<S, 16> low = __builtin_shufflevector(a.v, b.v, 0, 1, 2, 3, 4, 5, 6, 7, 16, 17, 18, 19, 20, 21, 22, 23);
-  const Pack<S, 16> high =
-      __builtin_shufflevector(a.v, b.v, 8, 9, 10, 11, 12, 13, 14, 15, 24, 25, 26, 27, 28, 29, 30, 31);
-  return low + high;
-}
-
 /// channels[c] gets channel c of all lanes from rows[lane]; W = 8 or 16 lanes.
 template <class S, int W>
 BRECCIA_HD void rows_to_channels(const Pack<S, 8>* rows, Pack<S, W> (&channels)[8]) {
