@@ -102,8 +102,11 @@ BRECCIA_HD FourNodes<P> gather_row(const Nodes& nodes, const Stencil<P>& s, int 
   const ColumnSums<N> sums = sum_moving<P>(nodes, s, lane);
   const N rest = sum_rest<P>(nodes, s, lane);
   // Slopes of the fourth channel nobody needs: the rest of v_old takes their place (RestChannel).
-  const N x(__builtin_shufflevector(sums.x.v, rest.v, 0, 1, 2, 19, 4, 5, 6, 23, 8, 9, 10, 27, 12, 13, 14, 31));
-  const N y(__builtin_shufflevector(sums.y.v, rest.v, 0, 1, 2, 16, 4, 5, 6, 20, 8, 9, 10, 24, 12, 13, 14, 28));
+  constexpr int kY = 16 + kRestOldY, kZ = 16 + kRestOldZ;
+  const N x(
+      __builtin_shufflevector(sums.x.v, rest.v, 0, 1, 2, kY, 4, 5, 6, kY + 4, 8, 9, 10, kY + 8, 12, 13, 14, kY + 12));
+  const N y(
+      __builtin_shufflevector(sums.y.v, rest.v, 0, 1, 2, kZ, 4, 5, 6, kZ + 4, 8, 9, 10, kZ + 8, 12, 13, 14, kZ + 12));
   const N low = quarters<0, 1, 0, 1>(x, y);
   const N high = quarters<2, 3, 2, 3>(x, y);
   alignas(64) static constexpr Real kFirst[16] = {1, 1, 1, 1, -1, -1, -1, -1, 1, 1, 1, 1, 1, 1, 1, 1};

@@ -2,9 +2,6 @@
 // cache line; a fourth node has weight 0.
 #pragma once
 
-#include <type_traits>
-#include <utility>
-
 #include "grid/stencil.hpp"
 #include "grid/transfer.hpp"
 #include "grid/transpose.hpp"
@@ -23,63 +20,44 @@ class StencilSums {
   BRECCIA_HD explicit StencilSums(Real* origin) { load(origin); }
   BRECCIA_HD void load(Real* origin) {
     origin_ = in_one_register(origin);
-    for_each([&](auto p, auto i, auto j) BRECCIA_INLINE_LAMBDA { at(p, i, j) = N::load(node(p, i, j)); });
+    for (int p = 0; p < 2; ++p) {
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) sum_[p][i][j] = N::load(node(p, i, j));
+      }
+    }
   }
   BRECCIA_HD void store() const {
-    for_each([&](auto p, auto i, auto j) BRECCIA_INLINE_LAMBDA { at(p, i, j).store(node(p, i, j)); });
+    for (int p = 0; p < 2; ++p) {
+      for (int i = 0; i < 3; ++i) {
+        for (int j = 0; j < 3; ++j) sum_[p][i][j].store(node(p, i, j));
+      }
+    }
   }
   BRECCIA_HD void add(const Stencil<P>& s, int lane, const Real* value_x, const Real* y_z) {
     const N value = load_twice<Real, N::kLanes>(value_x);
     const N x = load_twice<Real, N::kLanes>(value_x + kChannels);
     const N y = load_twice<Real, N::kLanes>(y_z);
     const N z = load_twice<Real, N::kLanes>(y_z + kChannels);
-    add_pair<0>(s, lane, value, x, y, z);
-    add_pair<1>(s, lane, value, x, y, z);
+    for (int p = 0; p < 2; ++p) {
+      const N wz = halves<Real, N::kLanes>(s.weight_z[2 * p][lane], s.weight_z[2 * p + 1][lane]);
+      const N mz = halves<Real, N::kLanes>(s.moment_z[2 * p][lane], s.moment_z[2 * p + 1][lane]);
+      const N middle = wz * value + mz * z;
+      const N slope_x = wz * x;
+      const N slope_y = wz * y;
+      const N along_x[3] = {middle - slope_x, middle, middle + slope_x};
+      for (int i = 0; i < 3; ++i) {
+        sum_[p][i][0] += N(s.weight_xy[i][0][lane]) * (along_x[i] - slope_y);
+        sum_[p][i][1] += N(s.weight_xy[i][1][lane]) * along_x[i];
+        sum_[p][i][2] += N(s.weight_xy[i][2][lane]) * (along_x[i] + slope_y);
+      }
+    }
   }
 
  private:
-  template <int p>
-  BRECCIA_HD void add_pair(const Stencil<P>& s, int lane, N value, N x, N y, N z) {
-    const N wz = halves<Real, N::kLanes>(s.weight_z[2 * p][lane], s.weight_z[2 * p + 1][lane]);
-    const N mz = halves<Real, N::kLanes>(s.moment_z[2 * p][lane], s.moment_z[2 * p + 1][lane]);
-    const N middle = wz * value + mz * z;
-    const N slope_x = wz * x;
-    const N slope_y = wz * y;
-    add_plane<p, 0>(s, lane, middle - slope_x, slope_y);
-    add_plane<p, 1>(s, lane, middle, slope_y);
-    add_plane<p, 2>(s, lane, middle + slope_x, slope_y);
-  }
-  template <int p, int i>
-  BRECCIA_HD void add_plane(const Stencil<P>& s, int lane, N middle, N slope) {
-    sum_[9 * p + 3 * i] += N(s.weight_xy[i][0][lane]) * (middle - slope);
-    sum_[9 * p + 3 * i + 1] += N(s.weight_xy[i][1][lane]) * middle;
-    sum_[9 * p + 3 * i + 2] += N(s.weight_xy[i][2][lane]) * (middle + slope);
-  }
-  template <class F, int... n>
-  BRECCIA_HD static void for_each(F&& f, std::integer_sequence<int, n...>) {
-    (f(std::integral_constant<int, n / 9>(), std::integral_constant<int, n / 3 % 3>(),
-       std::integral_constant<int, n % 3>()),
-     ...);
-  }
-  template <class F>
-  BRECCIA_HD static void for_each(F&& f) {
-    for_each(f, std::make_integer_sequence<int, 18>());
-  }
-  template <class A, class B, class C>
-  BRECCIA_HD N& at(A, B, C) {
-    return sum_[9 * A::value + 3 * B::value + C::value];
-  }
-  template <class A, class B, class C>
-  BRECCIA_HD const N& at(A, B, C) const {
-    return sum_[9 * A::value + 3 * B::value + C::value];
-  }
-  template <class A, class B, class C>
-  BRECCIA_HD Real* node(A, B, C) const {
-    return origin_ + tile_index(B::value, C::value, 2 * A::value) * kChannels;
-  }
+  BRECCIA_HD Real* node(int p, int i, int j) const { return origin_ + tile_index(i, j, 2 * p) * kChannels; }
 
   Real* origin_;
-  N sum_[18];
+  N sum_[2][3][3];
 };
 
 }  // namespace detail
