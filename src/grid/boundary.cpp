@@ -47,7 +47,8 @@ BoundarySet::BoundarySet(std::span<const BoundaryPlane> planes, double cell) : c
   }
 }
 
-void BoundarySet::find_nodes(std::uint32_t index, BlockKey key, std::vector<WallNode>& nodes) const {
+// Calls visit(node of the block, wall) for the nodes that lie in or behind a wall.
+void BoundarySet::for_each_node(BlockKey key, const std::function<void(std::uint32_t, std::uint32_t)>& visit) const {
   const BlockCoord block = block_coord(key);
   for (std::uint32_t n = 0; n < kBlockNodes; ++n) {
     const auto node = static_cast<int>(n);
@@ -56,7 +57,7 @@ void BoundarySet::find_nodes(std::uint32_t index, BlockKey key, std::vector<Wall
     const int k = kBlockWidth * block.z + node % 4;
     const Vec3d x = cell_ * Vec3d{static_cast<double>(i), static_cast<double>(j), static_cast<double>(k)};
     for (std::uint32_t w = 0; w < walls_.size(); ++w) {
-      if (holds_node(walls_[w], x, cell_)) nodes.push_back({index * kBlockNodes + n, w});
+      if (holds_node(walls_[w], x, cell_)) visit(n, w);
     }
   }
 }
@@ -64,7 +65,7 @@ void BoundarySet::find_nodes(std::uint32_t index, BlockKey key, std::vector<Wall
 template <class Real>
 void BoundarySet::apply(std::span<const WallNode> nodes, Real* velocities) const {
   for (const WallNode& at : nodes) {
-    Real* v = velocities + std::size_t{at.node} * kChannels + kNewVelocity;
+    Real* v = velocities + at.place;
     const Vec3d allowed = constrained(walls_[at.wall], {v[0], v[1], v[2]});
     v[0] = static_cast<Real>(allowed.x);
     v[1] = static_cast<Real>(allowed.y);

@@ -2,6 +2,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <vector>
 
@@ -19,17 +20,19 @@ class BoundarySet {
   /// True if there are planes other than periodic ones.
   [[nodiscard]] bool has_walls() const { return !walls_.empty(); }
   [[nodiscard]] std::span<const BoundaryPlane> walls() const { return walls_; }
-  /// Finds the nodes of these blocks that lie in or behind a wall. `shared(b)`: whether block b is updated before the
-  /// rest.
-  template <class Shared>
-  void find_nodes(std::span<const BlockKey> blocks, Shared&& shared) {
+  /// Finds the nodes of these blocks that lie in or behind a wall. `place(b, n)`: where v_new of node n of block b lies
+  /// among the velocities [reals]; `shared(b)`: whether block b is updated before the rest.
+  template <class Place, class Shared>
+  void find_nodes(std::span<const BlockKey> blocks, Place&& place, Shared&& shared) {
     shared_nodes_.clear();
     rest_.clear();
     for (std::uint32_t b = 0; !walls_.empty() && b < blocks.size(); ++b) {
-      find_nodes(b, blocks[b], shared(b) ? shared_nodes_ : rest_);
+      for_each_node(blocks[b], [&](std::uint32_t node, std::uint32_t wall) {
+        (shared(b) ? shared_nodes_ : rest_).push_back({place(b, node), wall});
+      });
     }
   }
-  /// Applies the walls to v^{n+1/2} of the found nodes. `velocities` as in tile.hpp.
+  /// Applies the walls to v^{n+1/2} of the found nodes.
   template <class Real>
   void apply_to_shared(Real* velocities) const {
     apply(shared_nodes_, velocities);
@@ -53,10 +56,10 @@ class BoundarySet {
 
  private:
   struct WallNode {
-    std::uint32_t node;
+    std::size_t place;
     std::uint32_t wall;
   };
-  void find_nodes(std::uint32_t index, BlockKey key, std::vector<WallNode>& nodes) const;
+  void for_each_node(BlockKey block, const std::function<void(std::uint32_t, std::uint32_t)>& visit) const;
   template <class Real>
   void apply(std::span<const WallNode> nodes, Real* velocities) const;
 

@@ -1,10 +1,10 @@
-// Gather with four nodes per register, four channels each: the velocities of a tile lie in two arrays for it, so that
-// the three nodes of a stencil along z are one load of either (tile_velocities.hpp). Nothing but the weights is the
+// Gather with four nodes per register, four channels each: the velocities of the nodes lie in two arrays for it, so that
+// the three nodes of a stencil along z are one load of either (node_velocities.hpp). Nothing but the weights is the
 // particle's own until the sums over x and y are done.
 #pragma once
 
 #include "grid/stencil.hpp"
-#include "grid/tile_velocities.hpp"
+#include "grid/tile_nodes.hpp"
 #include "grid/transfer.hpp"
 #include "grid/transpose.hpp"
 
@@ -12,25 +12,23 @@ namespace breccia::grid {
 
 namespace detail {
 
-// The last load of a stencil takes a node more than the stencil has.
-static_assert(tile_index(kTileWidth - 1, kTileWidth - 1, kTileHeight - 3) + 4 <= kTileNodes);
-
-/// The nodes of a stencil in memory: of each column four nodes along z, four channels of v_new (with x of v_old) and
-/// the rest of v_old.
+/// The nodes of a stencil in memory: of each column four nodes along z, one more than the stencil has, four channels of
+/// v_new (with x of v_old) and the rest of v_old.
 template <class P>
 class NodesInMemory {
   using N = FourNodes<P>;
 
  public:
-  BRECCIA_HD NodesInMemory(const typename P::Real* nodes, int start)
-      : origin_(in_one_register(nodes + start * kVelocityChannels)) {}
-  BRECCIA_HD N moving(int i, int j) const { return N::load(origin_ + tile_index(i, j, 0) * kVelocityChannels); }
-  BRECCIA_HD N rest(int i, int j) const {
-    return N::load(origin_ + (kTileNodes + tile_index(i, j, 0)) * kVelocityChannels);
-  }
+  BRECCIA_HD NodesInMemory(const TileNodes<P>& nodes, const Stencil<P>& s, int lane)
+      : columns_(nodes.velocities + s.column(lane)),
+        moving_(static_cast<std::size_t>(s.along_z(lane)) * kVelocityChannels),
+        rest_(moving_ + nodes.rest) {}
+  BRECCIA_HD N moving(int i, int j) const { return N::load(columns_[column_index(i, j)] + moving_); }
+  BRECCIA_HD N rest(int i, int j) const { return N::load(columns_[column_index(i, j)] + rest_); }
 
  private:
-  const typename P::Real* origin_;
+  const typename P::Real* const* columns_;
+  std::size_t moving_, rest_;
 };
 
 /// The same in registers, for several particles of one stencil.
@@ -118,25 +116,25 @@ BRECCIA_HD FourNodes<P> gather_row(const Nodes& nodes, const Stencil<P>& s, int 
 }
 
 template <class P>
-BRECCIA_HD void gather_each(const typename P::Real* nodes, const Stencil<P>& s, int lanes, FourNodes<P>* row) {
-  for (int l = 0; l < lanes; ++l) row[l] = gather_row<P>(NodesInMemory<P>(nodes, s.start[l]), s, l);
+BRECCIA_HD void gather_each(const TileNodes<P>& nodes, const Stencil<P>& s, int lanes, FourNodes<P>* row) {
+  for (int l = 0; l < lanes; ++l) row[l] = gather_row<P>(NodesInMemory<P>(nodes, s, l), s, l);
 }
 
 /// The same where neighbours mostly share their stencil: its nodes are read once for all of them.
 template <class P>
-BRECCIA_HD void gather_runs(const typename P::Real* nodes, const Stencil<P>& s, int lanes, FourNodes<P>* row) {
-  NodesInRegisters<P> here(NodesInMemory<P>(nodes, s.start[0]));
+BRECCIA_HD void gather_runs(const TileNodes<P>& nodes, const Stencil<P>& s, int lanes, FourNodes<P>* row) {
+  NodesInRegisters<P> here(NodesInMemory<P>(nodes, s, 0));
   for (int l = 0;;) {
     row[l] = gather_row<P>(here, s, l);
     if (++l == lanes) return;
-    if (s.start[l] != s.start[l - 1]) here = NodesInRegisters<P>(NodesInMemory<P>(nodes, s.start[l]));
+    if (s.start[l] != s.start[l - 1]) here = NodesInRegisters<P>(NodesInMemory<P>(nodes, s, l));
   }
 }
 
 }  // namespace detail
 
 template <class P>
-BRECCIA_HD void gather_fours(const typename P::Real* nodes, const Stencil<P>& s, int lanes, GatheredVelocity<P>& g) {
+BRECCIA_HD void gather_fours(const TileNodes<P>& nodes, const Stencil<P>& s, int lanes, GatheredVelocity<P>& g) {
   static_assert(P::kLanes == 4 * kVelocityChannels);
   FourNodes<P> row[P::kLanes];
   if (mostly_shared(s, lanes)) {

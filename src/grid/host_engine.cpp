@@ -42,7 +42,6 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
   a.tiles = tiles_.data();
   a.targets = ordered_.targets().empty() ? tiles_.data() : ordered_.targets().data();
   a.tile_count = static_cast<std::uint32_t>(tiles_.size());
-  a.boxes = boxes_.data();
   a.kinematics = store_.kinematics.data();
   a.volume = store_.volume.data();
   a.elastic = store_.elastic.data();
@@ -56,6 +55,7 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
   a.lone_pull = lone_pull_.data();
   a.kick = static_cast<Real>(kick_);
   a.velocities = velocities_.data();
+  a.places = places();
   a.sums = sums_.data();
   a.rows = rows_.data();
   a.flaw_codes = flaw_codes_.data();
@@ -96,7 +96,8 @@ void HostEngine<P>::gather(double step) {
 template <class P>
 void HostEngine<P>::gather_scatter(double step) {
   const NodeArguments<P> nodes = node_arguments(step);
-  run_pass(pass_arguments(step, 0.5 * step), &nodes);
+  // What lies beyond a period must be added up first.
+  run_pass(pass_arguments(step, 0.5 * step), images_.empty() ? &nodes : nullptr);
   trailing_kick_ = step;
 }
 
@@ -105,6 +106,8 @@ NodeArguments<P> HostEngine<P>::node_arguments(double kick) {
   NodeArguments<P> a;
   a.sums = sums_.data();
   a.velocities = velocities_.data();
+  a.places = places();
+  a.blocks = columns_.blocks().data();
   a.rows = rows_.data();
   a.kick = static_cast<Real>(kick);
   a.smallest_mass = static_cast<Real>(1e-30 * smallest_mass_);
@@ -127,13 +130,16 @@ void HostEngine<P>::update_grid(double kick) {
   {
 #pragma omp for schedule(static)
     for (std::size_t n = ordered_.shared_sums(); n < ordered_.sums(); ++n) {
-      ordered_.add_up(n, sums_.data(), rows_.data());
+      ordered_.add_up(n, columns_, sums_.data(), rows_.data());
     }
+#pragma omp single
+    images_.fold(images_.rest(), columns_, sums_.data(), rows_.data());
     // What the passes have left lies together: blocks that no tile stands in.
 #pragma omp for schedule(dynamic)
     for (std::uint32_t b = 0; b < blocks; b += kChunk) kernels_.update_blocks(a, b, std::min(b + kChunk, blocks));
   }
   boundaries_.apply_to_rest(velocities_.data());
+  copy_to_images(images_.rest());
   finish_velocities();
 }
 

@@ -7,6 +7,7 @@
 #include "grid/engine.hpp"
 #include "grid/occupancy.hpp"
 #include "grid/ordered_sums.hpp"
+#include "grid/period_images.hpp"
 #include "grid/sweep_plan.hpp"
 #include "grid/tile.hpp"
 #include "mpi/halo.hpp"
@@ -79,7 +80,11 @@ class HostEngine final : public Engine {
 
   // Memory (host_engine_memory.cpp).
   [[nodiscard]] bool has_few_nodes() const;  // beside particles
-  void hold(LargeArray<Real>& values, std::size_t blocks);
+  [[nodiscard]] std::size_t places() const { return node_places_; }
+  [[nodiscard]] std::uint32_t velocity_half(std::uint32_t place, std::uint32_t h) const {
+    return kernels_.velocity_half(place, h, places());
+  }
+  void hold(LargeArray<Real>& values, std::size_t places);
   void hold_sums();
   void hold_velocities();
   void drop_sums();  // and the next: where nodes are few
@@ -95,6 +100,7 @@ class HostEngine final : public Engine {
   void update_shared(const NodeArguments<P>& arguments);  // with the sums that have arrived; sends velocities
   void finish_sums(const NodeArguments<P>& arguments);
   void finish_velocities();
+  void copy_to_images(std::span<const PeriodImages::Image> images);
   void wait_for_velocities();
   // Calls work(); its time is a bar of the timeline.
   template <class F>
@@ -135,6 +141,10 @@ class HostEngine final : public Engine {
   [[nodiscard]] std::vector<std::vector<BlockRequest>> reach_blocks();
   void connect_halo();
   [[nodiscard]] std::vector<mpi::SharedNodes> nodes_of(const std::vector<std::vector<BlockRequest>>& requests) const;
+  [[nodiscard]] std::vector<mpi::SharedNodes> velocity_halves_of(const std::vector<mpi::SharedNodes>& peers) const;
+  [[nodiscard]] BlockCoord stored(BlockCoord block) const;  // as whose nodes those of a tile's block lie in memory
+  void insert_owned(BlockCoord stored_block);
+  void share_with_images();
   void sort_cells_by_id(std::span<std::uint32_t> source, std::span<const std::uint32_t> cell_ends) const;
   void compact_flaws();
   void switch_damage_off();
@@ -200,7 +210,6 @@ class HostEngine final : public Engine {
   std::vector<BlockKey> stacks_;               // lowest block of each tile
   std::size_t occupied_blocks_ = 0;            // of the tiles
   std::vector<OccupiedCells> occupied_cells_;  // of each tile at the last sorting
-  std::vector<TileBox> boxes_;
   Sweep sweep_;
   LonePacks lone_;
   std::vector<BlockCoord> lone_stack_;
@@ -208,6 +217,9 @@ class HostEngine final : public Engine {
   std::vector<LonePull<P>> lone_pull_;
   double kick_ = 0.0;  // of the last grid update [s]
   BlockTable blocks_;
+  NodeColumns columns_;           // of blocks_, and behind them those of ordered_
+  std::size_t node_places_ = 0;   // of the former alone
+  PeriodImages images_;
   LargeArray<Real> sums_;
   LargeArray<Real> velocities_;
   std::vector<RowMask> rows_;
@@ -223,7 +235,7 @@ class HostEngine final : public Engine {
   mpi::StandingRequests<BlockRequest> block_requests_;
   OrderedSums ordered_;  // of a reproducible run
   mpi::NodeExchange<Real, kChannels> sum_exchange_{1};
-  mpi::NodeExchange<Real, kChannels> velocity_exchange_{2};
+  mpi::NodeExchange<Real, kVelocityChannels> velocity_exchange_{2};
   bool shared_updated_ = false;   // since the sums were sent
   Timeline* timeline_ = nullptr;  // of the run; null: none wanted
   PassReport report_;

@@ -1,5 +1,7 @@
 // After sorting: which blocks a tile reaches, which nodes are shared with other ranks, which tiles are of the boundary.
 #include <algorithm>
+#include <bit>
+#include <unordered_set>
 
 #include "grid/host_engine.hpp"
 
@@ -16,7 +18,8 @@ unsigned reached_blocks(unsigned cells, int blocks_of_stack) {
     const unsigned from = (2U << last) - (1U << std::max(first, 0));
     if ((cells & from) != 0) reached |= 1U << slot;
   }
-  return reached;
+  // Columns of a tile have no gaps.
+  return (1U << std::bit_width(reached)) - (1U << std::countr_zero(reached));
 }
 
 BlockCoord neighbour(BlockKey stack, int n) {
@@ -65,6 +68,29 @@ std::array<std::uint32_t, kNeighbours> reached_planes(const ParticleStore<P>& st
   return planes;
 }
 
+// Where stencils of the particles may begin: a node before theirs, and a node further as they drift.
+TileBox reached_starts(const OccupiedCells& cells) {
+  TileBox starts{};
+  for (int axis = 0; axis < 3; ++axis) {
+    const std::uint16_t occupied = cells.axis[axis];
+    starts.low[axis] = static_cast<std::int8_t>(std::countr_zero(occupied) + kTileMargin - 2);
+    starts.high[axis] = static_cast<std::int8_t>(std::bit_width(occupied) - 1 + kTileMargin);
+  }
+  return starts;
+}
+
+// In columns all blocks are collected if one is not added to in place: a tile adds to whole columns.
+void collect_whole_columns(std::span<const BlockKey> keys, std::span<BlockSums> owned) {
+  std::unordered_set<BlockKey> columns;
+  const auto column_of = [](BlockKey key) { return key & ~((BlockKey{1} << 21) - 1); };
+  for (std::size_t b = 0; b < keys.size(); ++b) {
+    if (b >= owned.size() || owned[b] != BlockSums::kInPlace) columns.insert(column_of(keys[b]));
+  }
+  for (std::size_t b = 0; b < owned.size(); ++b) {
+    if (owned[b] == BlockSums::kInPlace && columns.contains(column_of(keys[b]))) owned[b] = BlockSums::kCollected;
+  }
+}
+
 // One request for each block, in the order of their keys.
 void merge(std::vector<BlockRequest>& requests) {
   std::sort(requests.begin(), requests.end(), [](const auto& a, const auto& b) { return a.key < b.key; });
@@ -89,9 +115,9 @@ std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
     bool all_mine = true;
     std::array<std::uint32_t, kNeighbours> planes{};
     for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord there) {
-      const BlockCoord b = periodicity_.wrap(there);
+      const BlockCoord b = stored(there);
       const std::uint32_t mine = own_planes(b);
-      if (mine != 0) blocks_.insert(block_key(b));
+      if (mine != 0) insert_owned(b);
       all_mine = all_mine && mine == kAllPlanes;
       planes[static_cast<std::size_t>(n)] = planes_in_reach(neighbour_offset(n), axis);
     });
@@ -99,16 +125,29 @@ std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
     // Ordered sums are told for each tile, and all of its box.
     if (!setup_.numerics.reproducible) planes = reached_planes(store_, tiles_[t], axis);
     for (int n = 0; n < kNeighbours; ++n) {
-      const BlockCoord b = periodicity_.wrap(neighbour(stacks_[t], n));
+      const BlockCoord b = stored(neighbour(stacks_[t], n));
       const std::uint32_t foreign = planes[static_cast<std::size_t>(n)] & ~own_planes(b);
       for (std::int32_t plane = 0; plane < kBlockWidth; ++plane) {
         if ((foreign >> plane & 1U) == 0) continue;
-        of_rank[static_cast<std::size_t>(slabs_.owner(first_plane(b) + plane))].push_back({block_key(b), 1U << plane});
+        of_rank[static_cast<std::size_t>(slabs_.owner(first_plane(periodicity_.wrap(b)) + plane))].push_back({block_key(b), 1U << plane});
       }
     }
   }
   for (std::vector<BlockRequest>& requests : of_rank) merge(requests);
   return of_rank;
+}
+
+template <class P>
+BlockCoord HostEngine<P>::stored(BlockCoord block) const {
+  // Columns of blocks go on beyond the period.
+  const BlockCoord wrapped = periodicity_.wrap(block);
+  return {wrapped.x, wrapped.y, block.z};
+}
+
+template <class P>
+void HostEngine<P>::insert_owned(BlockCoord stored_block) {
+  blocks_.insert(block_key(stored_block));
+  blocks_.insert(block_key(periodicity_.wrap(stored_block)));
 }
 
 template <class P>
@@ -133,7 +172,7 @@ void HostEngine<P>::connect_tiles() {
   block_requests_.ask(reach_blocks(), comm_);
   // Blocks that only other ranks touch must exist here, too.
   for (const auto& requests : block_requests_.by_rank()) {
-    for (const BlockRequest& request : requests) blocks_.insert(request.key);
+    for (const BlockRequest& request : requests) insert_owned(block_coord(request.key));
   }
   owned_blocks_ = blocks_.size();
   for (const auto& requests : block_requests_.of_rank()) {
@@ -142,15 +181,27 @@ void HostEngine<P>::connect_tiles() {
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::fill(std::begin(tiles_[t].neighbours), std::end(tiles_[t].neighbours), kNoBlock);
     for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord b) {
-      tiles_[t].neighbours[n] = blocks_.insert(block_key(periodicity_.wrap(b)));
+      tiles_[t].neighbours[n] = blocks_.insert(block_key(stored(b)));
     });
   }
+  columns_.lay_out(blocks_.keys());
+  node_places_ = columns_.places();
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    tiles_[t].starts = reached_starts(occupied_cells_[t]);
+    set_columns(tiles_[t], columns_.blocks());
+  }
   connect_halo();
-  rows_.assign(std::max(blocks_.size(), ordered_.blocks()), RowMask{});
+  rows_.assign(columns_.blocks().size(), RowMask{});
   if (!has_few_nodes()) hold_velocities();
   sweep_ = plan_sweep(stacks_, is_boundary_, periodicity_.blocks[0], setup_.threads);
-  boundaries_.find_nodes(std::span(blocks_.keys()).first(owned_blocks_),
-                         [&](std::uint32_t b) { return block_sums_[b] == BlockSums::kShared; });
+  const auto is_shared = [&](std::uint32_t b) { return block_sums_[b] == BlockSums::kShared; };
+  images_.find(blocks_, owned_blocks_, periodicity_, [&](const auto& image) { return is_shared(image.block); });
+  boundaries_.find_nodes(
+      std::span(blocks_.keys()).first(owned_blocks_),
+      [&](std::uint32_t b, std::uint32_t n) {
+        return std::size_t{velocity_half(columns_.blocks()[b].node(n), 0)} * kVelocityChannels;
+      },
+      is_shared);
 }
 
 template <class P>
@@ -167,6 +218,7 @@ void HostEngine<P>::connect_halo() {
       }
     }
   }
+  share_with_images();
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     for (const std::uint32_t b : tiles_[t].neighbours) {
       if (b != kNoBlock && (b >= owned_blocks_ || block_sums_[b] == BlockSums::kShared)) is_boundary_[t] = 1;
@@ -189,14 +241,39 @@ void HostEngine<P>::connect_halo() {
         }
       }
     }
+    collect_whole_columns(blocks_.keys(), block_sums_);
     ContributionMessages messages = ordered_.connect(
-        tiles_, stacks_, blocks_, block_sums_, periodicity_.blocks[0],
-        [&](BlockCoord b) { return slabs_.owner(first_plane(b)); }, comm_);
+        tiles_, stacks_, blocks_, columns_, block_sums_, periodicity_.blocks[0],
+        [&](BlockCoord b) { return slabs_.owner(first_plane(periodicity_.wrap(b))); }, comm_);
     sum_exchange_.set(std::move(messages.sent), std::move(messages.received), comm_);
   } else {
     sum_exchange_.set(touched, owned, comm_);
   }
-  velocity_exchange_.set(std::move(owned), std::move(touched), comm_);
+  velocity_exchange_.set(velocity_halves_of(owned), velocity_halves_of(touched), comm_);
+}
+
+// The sums of an image and of its original are added up at the same time.
+template <class P>
+void HostEngine<P>::share_with_images() {
+  images_.find(blocks_, owned_blocks_, periodicity_, [](const auto&) { return false; });
+  const auto share = [&](std::uint32_t from, std::uint32_t to) {
+    if (block_sums_[from] == BlockSums::kShared) block_sums_[to] = BlockSums::kShared;
+  };
+  for (const PeriodImages::Image& image : images_.rest()) share(image.block, image.original);
+  for (const PeriodImages::Image& image : images_.rest()) share(image.original, image.block);
+}
+
+template <class P>
+std::vector<mpi::SharedNodes> HostEngine<P>::velocity_halves_of(const std::vector<mpi::SharedNodes>& peers) const {
+  std::vector<mpi::SharedNodes> halves = peers;
+  for (mpi::SharedNodes& peer : halves) {
+    const std::vector<std::uint32_t> nodes = std::move(peer.nodes);
+    peer.nodes.clear();
+    for (const std::uint32_t node : nodes) {
+      for (std::uint32_t h = 0; h < 2; ++h) peer.nodes.push_back(velocity_half(node, h));
+    }
+  }
+  return halves;
 }
 
 template <class P>
@@ -210,7 +287,7 @@ std::vector<mpi::SharedNodes> HostEngine<P>::nodes_of(const std::vector<std::vec
       const std::uint32_t block = blocks_.find(request.key);
       for (std::uint32_t n = 0; n < kBlockNodes; ++n) {
         const std::uint32_t plane = axis == 0 ? n / 16 : axis == 1 ? n / 4 % 4 : n % 4;
-        if ((request.planes >> plane & 1U) != 0) peer.nodes.push_back(block * kBlockNodes + n);
+        if ((request.planes >> plane & 1U) != 0) peer.nodes.push_back(columns_.blocks()[block].node(n));
       }
     }
     peers.push_back(std::move(peer));

@@ -1,6 +1,8 @@
 // Sums to the owners of nodes, velocities back: what a pass and the grid update do about it, and when.
 #include <omp.h>
 
+#include <algorithm>
+
 #include "grid/host_engine.hpp"
 
 namespace breccia::grid {
@@ -28,13 +30,15 @@ template <class P>
 void HostEngine<P>::update_shared(const NodeArguments<P>& arguments) {
   noted("shared nodes", [&] {
     sum_exchange_.add_received(sums_.data());
-    for (std::size_t n = 0; n < ordered_.shared_sums(); ++n) ordered_.add_up(n, sums_.data(), rows_.data());
+    for (std::size_t n = 0; n < ordered_.shared_sums(); ++n) ordered_.add_up(n, columns_, sums_.data(), rows_.data());
+    images_.fold(images_.shared(), columns_, sums_.data(), rows_.data());
     for (std::uint32_t b = 0; b < owned_blocks_; ++b) {
       if (block_sums_[b] != BlockSums::kShared) continue;
       rows_[b] = kAllRows;
       kernels_.update_blocks(arguments, b, b + 1);
     }
     boundaries_.apply_to_shared(velocities_.data());
+    copy_to_images(images_.shared());
     velocity_exchange_.send(velocities_.data());
   });
   shared_updated_ = true;
@@ -54,6 +58,20 @@ template <class P>
 void HostEngine<P>::finish_velocities() {
   if (velocity_exchange_.travelling()) wait_for_velocities();
   velocity_exchange_.take_received(velocities_.data());
+}
+
+template <class P>
+void HostEngine<P>::copy_to_images(std::span<const PeriodImages::Image> images) {
+  for (const PeriodImages::Image& image : images) {
+    for (std::uint32_t n = 0; n < kBlockNodes; ++n) {
+      for (std::uint32_t h = 0; h < 2; ++h) {
+        const auto half = [&](std::uint32_t block) {
+          return velocities_.data() + std::size_t{velocity_half(columns_.blocks()[block].node(n), h)} * kVelocityChannels;
+        };
+        std::copy_n(half(image.original), kVelocityChannels, half(image.block));
+      }
+    }
+  }
 }
 
 template <class P>

@@ -8,36 +8,32 @@
 
 namespace breccia::grid {
 
-namespace {
-constexpr std::size_t kBlockReals = kBlockNodes * kChannels;
-}
-
 template <class P>
 bool HostEngine<P>::has_few_nodes() const {
-  return 8 * blocks_.size() * kBlockReals * sizeof(Real) < store_.packs() * kLanes * store_.record_bytes();
+  return 8 * places() * kChannels * sizeof(Real) < store_.packs() * kLanes * store_.record_bytes();
 }
 
 // What the array held may be lost: its callers know that nobody reads it.
 template <class P>
-void HostEngine<P>::hold(LargeArray<Real>& values, std::size_t blocks) {
-  if (blocks * kBlockReals > values.capacity()) {
+void HostEngine<P>::hold(LargeArray<Real>& values, std::size_t places) {
+  if (places * kChannels > values.capacity()) {
     release(values);
     // Where nodes are many, some room for the next sortings.
-    values.reserve((has_few_nodes() ? blocks : blocks + blocks / 32) * kBlockReals);
+    values.reserve((has_few_nodes() ? places : places + places / 32) * kChannels);
   }
-  values.resize(blocks * kBlockReals, Real(0));
+  values.resize(places * kChannels, Real(0));
 }
 
 template <class P>
 void HostEngine<P>::hold_sums() {
   // The grid update has cleared every sum.
-  hold(sums_, std::max(blocks_.size(), ordered_.blocks()));
+  hold(sums_, columns_.places());
 }
 
 template <class P>
 void HostEngine<P>::hold_velocities() {
-  // Read are velocities of nodes that a scatter has reached since; copied are those beside them, too.
-  hold(velocities_, blocks_.size());
+  // Read are velocities of nodes that a scatter has reached since; loaded are those beside them, too.
+  hold(velocities_, places());
 }
 
 template <class P>

@@ -56,10 +56,10 @@ typename HostEngine<P>::GridView HostEngine<P>::probe() const {
   GridView grid{std::vector<Real>(3 * slots), std::vector<Real>(slots), std::vector<Real>(9 * slots)};
   ProbeArguments<P> probe;
   probe.tiles = tiles_.data();
-  probe.boxes = boxes_.data();
   probe.kinematics = store_.kinematics.data();
   probe.affine = store_.affine.data();
   probe.velocities = velocities_.data();
+  probe.places = places();
   probe.transfer = transfer_;
   probe.new_velocity = grid.new_velocity.data();
   probe.node_mass = grid.node_mass.data();

@@ -102,7 +102,7 @@ std::uint32_t HostEngine<P>::own_planes(BlockCoord block) const {
   if (comm_.size() == 1) return kAllPlanes;
   std::uint32_t own = 0;
   for (std::int32_t n = 0; n < kBlockWidth; ++n) {
-    if (slabs_.owner(first_plane(block) + n) == comm_.rank()) own |= 1U << n;
+    if (slabs_.owner(first_plane(periodicity_.wrap(block)) + n) == comm_.rank()) own |= 1U << n;
   }
   return own;
 }

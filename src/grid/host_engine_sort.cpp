@@ -216,10 +216,11 @@ void HostEngine<P>::arrange(Occupancy& occupancy) {
   lone_pull_.resize(packs_for(alone));
   const std::size_t beside = store_.gather(source, setup_.threads);
   count_bytes((source.capacity() + place.capacity()) * sizeof(std::uint32_t) + beside);
-  // Empty lanes take part in the passes, with mass 0, so they need a node as well.
-  for (std::size_t slot = 0; slot < source.size(); ++slot) {
+  // Empty lanes take part in the passes, with mass 0, so they need a node as well: that of the particle before them.
+  for (std::size_t slot = 1; slot < source.size(); ++slot) {
     if (source[slot] != ParticleStore<P>::kEmpty) continue;
-    store_.kinematics[slot / kLanes].node.set(static_cast<int>(slot % kLanes), CellInStack{0, 0, 0}.packed());
+    const std::int32_t before = store_.kinematics[(slot - 1) / kLanes].node[static_cast<int>((slot - 1) % kLanes)];
+    store_.kinematics[slot / kLanes].node.set(static_cast<int>(slot % kLanes), before);
   }
   if (store_.has(Group::kFlaws)) compact_flaws();
 }
@@ -228,7 +229,6 @@ void HostEngine<P>::arrange(Occupancy& occupancy) {
 template <class P>
 void HostEngine<P>::lay_out_tiles(std::span<std::uint32_t> place, std::uint32_t alone) {
   tiles_.assign(stacks_.size(), Tile{});
-  boxes_.assign(stacks_.size(), kWholeTile);
   std::uint32_t packs = 0;
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     tiles_[t].first_pack = packs;

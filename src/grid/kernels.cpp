@@ -5,12 +5,6 @@
 namespace breccia::grid::BRECCIA_ISA {
 namespace {
 
-template <class P>
-TileScratch<P>& scratch() {
-  static thread_local TileScratch<P> nodes;
-  return nodes;
-}
-
 template <class Fx>
 bool matches(const material::RuntimeEffects& fx) {
   return fx.shear == Fx::shear && fx.strength == Fx::strength && fx.damage == Fx::damage &&
@@ -32,7 +26,7 @@ BRECCIA_HD void specialised(const material::RuntimeEffects& fx, F&& run) {
 template <class P>
 void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
   specialised(a.effects,
-              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, scratch<P>(), tile, report); });
+              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, tile, report); });
 }
 
 template <class P>
@@ -44,9 +38,9 @@ template <class P>
 void probe(const ProbeArguments<P>& a, std::uint32_t index) {
   using Real = typename P::Real;
   const Tile& tile = a.tiles[index];
-  TileScratch<P>& nodes = scratch<P>();
-  load_tile<P>(tile, a.boxes[index], a.velocities, nodes.velocities);
-  Stencil<P> stencil;
+  TileNodes<P> nodes;
+  nodes.set_velocities(tile, a.velocities, a.places);
+  Stencil<P> stencil(tile.starts);
   const auto alpha = static_cast<Real>(a.transfer.alpha);
   for (std::uint32_t first = 0; first < tile.particles; first += P::kLanes) {
     const std::size_t pack = tile.first_pack + first / P::kLanes;
@@ -54,7 +48,7 @@ void probe(const ProbeArguments<P>& a, std::uint32_t index) {
     const int lanes = left < P::kLanes ? left : P::kLanes;
     const Kinematics<P>& k = a.kinematics[pack];
     stencil.set(k);
-    const GatheredVelocity<P> grid = gather<P>(nodes.velocities, stencil, lanes);
+    const GatheredVelocity<P> grid = gather<P>(nodes, stencil, lanes);
     for (int lane = 0; lane < lanes; ++lane) {
       const std::size_t slot = pack * P::kLanes + static_cast<std::size_t>(lane);
       for (std::size_t axis = 0; axis < 3; ++axis) {
@@ -62,8 +56,8 @@ void probe(const ProbeArguments<P>& a, std::uint32_t index) {
             grid.updated[axis][lane] + alpha * (k.velocity[axis][lane] - grid.previous[axis][lane]);
       }
       Real mass(0);
-      stencil.for_each_node(lane, [&](Real weight, int n) BRECCIA_INLINE_LAMBDA {
-        mass += weight * nodes.velocities[place_of_mass<P>(n)];
+      stencil.for_each_node(lane, [&](Real weight, int column, int z) BRECCIA_INLINE_LAMBDA {
+        mass += weight * nodes.velocities[column][z * kVelocityStride<P> + mass_distance<P>(a.places)];
       });
       a.node_mass[slot] = mass;
       const Real c = Real(4) / a.cell;  // as TileGrid::velocity
@@ -92,19 +86,20 @@ BRECCIA_HD N node_velocities(N sums, N inverse_mass, Real kick) {
   return velocity + N(kick) * acceleration + mass_alone;
 }
 
-// A register's worth of nodes from `first` on. Those without mass are at rest.
+// A register's worth of nodes from `place` on. Those without mass are at rest.
 template <class P>
-BRECCIA_HD void update_nodes_at(const NodeArguments<P>& a, std::size_t first) {
+BRECCIA_HD void update_nodes_at(const NodeArguments<P>& a, std::size_t place) {
   using Real = typename P::Real;
-  Real* sums = a.sums + first * kChannels;
-  Real* velocities = a.velocities + first * kChannels;
+  Real* sums = a.sums + place * kChannels;
+  Real* velocities = a.velocities + place * kVelocityStride<P>;
   if constexpr (kNodePairs<P>) {
     using N = TwoNodes<P>;
     const N values = N::load(sums);
     N(Real(0)).store(sums);
     const N mass = rearranged<6, 6, 6, 6, 6, 6, 6, 6>(values);
     // Lanes of an empty node may be anything until the selection.
-    select(mass > N(a.smallest_mass), node_velocities(values, N(Real(1)) / mass, a.kick), N(Real(0))).store(velocities);
+    const N moving = select(mass > N(a.smallest_mass), node_velocities(values, N(Real(1)) / mass, a.kick), N(Real(0)));
+    put_velocities<P>(moving, a.places, velocities);
   } else {
     using N = Node<P>;
     const Real mass = sums[kMass];
@@ -116,31 +111,34 @@ BRECCIA_HD void update_nodes_at(const NodeArguments<P>& a, std::size_t first) {
 }
 
 template <class P>
-BRECCIA_HD void update_nodes(const NodeArguments<P>& a, std::size_t first, std::size_t count) {
+BRECCIA_HD void update_row(const NodeArguments<P>& a, std::size_t first) {
   constexpr std::size_t kAtOnce = kNodePairs<P> ? 2 : 1;
-  for (std::size_t n = first; n < first + count; n += kAtOnce) update_nodes_at(a, n);
+  for (std::size_t n = 0; n < kBlockWidth; n += kAtOnce) update_nodes_at(a, first + n);
 }
 
 template <class P>
 void update_blocks(const NodeArguments<P>& a, std::uint32_t first, std::uint32_t last) {
-  for (std::size_t block = first; block < last; ++block) {
-    const unsigned rows = a.rows[block].half[0] | static_cast<unsigned>(a.rows[block].half[1]) << 8;
+  for (std::uint32_t block = first; block < last; ++block) {
+    unsigned rows = a.rows[block].half[0] | static_cast<unsigned>(a.rows[block].half[1]) << 8;
     a.rows[block] = {};
-    if (rows == 0xffffU) {
-      update_nodes(a, block * kBlockNodes, kBlockNodes);
-      continue;
-    }
-    for (std::size_t row = 0; row < kBlockNodes / kBlockWidth; ++row) {
-      if ((rows >> row & 1U) != 0) update_nodes(a, block * kBlockNodes + row * kBlockWidth, kBlockWidth);
+    const BlockPlace place = a.blocks[block];
+    for (std::size_t row = place.first; rows != 0; rows >>= 1U, row += place.height) {
+      if ((rows & 1U) != 0) update_row(a, row);
     }
   }
+}
+
+template <class P>
+std::uint32_t velocity_half(std::uint32_t place, std::uint32_t h, std::size_t places) {
+  return kNodePairs<P> ? place + h * static_cast<std::uint32_t>(places) : 2 * place + h;
 }
 
 }  // namespace
 
 template <class P>
 const Kernels<P>& kernels() {
-  static constexpr Kernels<P> table{&pass<P>, &probe<P>, &lone_pass<P>, &lone_probe<P>, &update_blocks<P>};
+  static constexpr Kernels<P> table{&pass<P>, &probe<P>, &lone_pass<P>, &lone_probe<P>,
+                                      &update_blocks<P>, &velocity_half<P>};
   return table;
 }
 template const Kernels<MixedPrecision>& kernels<MixedPrecision>();

@@ -35,7 +35,7 @@ class LoneGrid {
   }
 
   BRECCIA_HD void scatter(std::size_t i, int, const Kinematics<P>& k, const PackStress<P>& s, TileReport& report) {
-    if (any(Stencil<P>::outside(Stencil<P>::place(k)))) ++report.strayed;
+    if (any(Stencil<P>::outside(Stencil<P>::place(k), kAnyStart))) ++report.strayed;
     const T mass = max(k.mass, T(Real(1e-30)));  // empty lanes
     pull_of(i).rate = (T(Real(4) / (a_.cell * a_.cell)) * (s.volume / mass)) * s.tau;
   }
@@ -65,7 +65,7 @@ BRECCIA_HD void pass_over_lone(const PassArguments<P>& a, const Fx& fx, std::uin
 /// nodes, sum w^2 m.
 template <class P>
 BRECCIA_HD void probe_lone(const ProbeArguments<P>& a) {
-  Stencil<P> stencil;
+  Stencil<P> stencil(kAnyStart);
   for (std::uint32_t n = 0; n * P::kLanes < a.lone.particles; ++n) {
     const std::size_t pack = std::size_t{a.lone.first_pack} + n;
     const Kinematics<P>& k = a.kinematics[pack];
@@ -80,7 +80,7 @@ BRECCIA_HD void probe_lone(const ProbeArguments<P>& a) {
         a.new_velocity[3 * slot + axis] = k.velocity[axis][lane] + a.kick * gravity[axis][lane];
       }
       typename P::Real squares(0);
-      stencil.for_each_node(lane, [&](auto weight, int) BRECCIA_INLINE_LAMBDA { squares += weight * weight; });
+      stencil.for_each_node(lane, [&](auto weight, int, int) BRECCIA_INLINE_LAMBDA { squares += weight * weight; });
       a.node_mass[slot] = k.mass[lane] * squares;
       for (std::size_t n9 = 0; n9 < 9; ++n9) {
         a.gradient[9 * slot + n9] = a.affine[pack].gradient[n9][lane] - a.kick * rate[n9][lane];

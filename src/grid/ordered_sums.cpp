@@ -24,11 +24,11 @@ struct Reach {
       : x(planes_in_reach(offset, 0)), y(planes_in_reach(offset, 1)), z(planes_in_reach(offset, 2)) {}
 };
 
-void append_nodes(std::vector<std::uint32_t>& nodes, std::uint32_t block, std::int32_t neighbour) {
+void append_nodes(std::vector<std::uint32_t>& nodes, const BlockPlace& block, std::int32_t neighbour) {
   const Reach r(neighbour_offset(neighbour));
   for (std::uint32_t x = r.x.first; x <= r.x.last; ++x) {
     for (std::uint32_t y = r.y.first; y <= r.y.last; ++y) {
-      for (std::uint32_t z = r.z.first; z <= r.z.last; ++z) nodes.push_back(block * kBlockNodes + 16 * x + 4 * y + z);
+      for (std::uint32_t z = r.z.first; z <= r.z.last; ++z) nodes.push_back(block.node(x, y, z));
     }
   }
 }
@@ -49,16 +49,15 @@ RowMask rows_of(std::int32_t neighbour) {
 
 int OrderedSums::sweep_turn_of(BlockKey tile, std::int32_t period) { return sweep_turn(block_coord(tile).x, period); }
 
-void OrderedSums::begin(std::span<const Tile> tiles, const BlockTable& blocks, int ranks) {
+void OrderedSums::begin(std::span<const Tile> tiles, int ranks) {
   targets_.assign(tiles.begin(), tiles.end());
   parts_.clear();
-  end_ = static_cast<std::uint32_t>(blocks.size());
   given_.assign(static_cast<std::size_t>(ranks), {});
   given_from_.assign(static_cast<std::size_t>(ranks), {});
 }
 
-void OrderedSums::add(std::uint32_t tile, std::uint32_t block, const Contribution& c, int rank, int self) {
-  const std::uint32_t own = end_++;
+void OrderedSums::add(std::uint32_t tile, std::uint32_t block, const Contribution& c, std::uint32_t own, int rank,
+                      int self) {
   targets_[tile].neighbours[c.neighbour] = own;
   if (rank == self) {
     parts_.push_back({block, c, own, {}});
@@ -68,14 +67,14 @@ void OrderedSums::add(std::uint32_t tile, std::uint32_t block, const Contributio
   }
 }
 
-ContributionMessages OrderedSums::finish(const BlockTable& blocks, std::span<const BlockSums> owned,
-                                         const mpi::Comm& comm) {
+ContributionMessages OrderedSums::finish(const BlockTable& blocks, NodeColumns& columns,
+                                         std::span<const BlockSums> owned, const mpi::Comm& comm) {
   ContributionMessages messages;
   for (std::size_t rank = 0; rank < given_.size(); ++rank) {
     if (given_[rank].empty()) continue;
     mpi::SharedNodes& to = messages.sent.emplace_back(mpi::SharedNodes{static_cast<int>(rank), {}});
     for (std::size_t i = 0; i < given_[rank].size(); ++i) {
-      append_nodes(to.nodes, given_from_[rank][i], given_[rank][i].neighbour);
+      append_nodes(to.nodes, columns.blocks()[given_from_[rank][i]], given_[rank][i].neighbour);
     }
   }
   requests_.ask(std::move(given_), comm);
@@ -84,8 +83,9 @@ ContributionMessages OrderedSums::finish(const BlockTable& blocks, std::span<con
     if (of_rank.empty()) continue;
     mpi::SharedNodes& from = messages.received.emplace_back(mpi::SharedNodes{static_cast<int>(rank), {}});
     for (const Contribution& c : of_rank) {
-      const std::uint32_t own = end_++;
-      append_nodes(from.nodes, own, c.neighbour);
+      const auto own = static_cast<std::uint32_t>(columns.blocks().size());
+      columns.append_run(1);
+      append_nodes(from.nodes, columns.blocks()[own], c.neighbour);
       parts_.push_back({blocks.find(c.block), c, own, rows_of(c.neighbour)});
     }
   }
@@ -104,22 +104,23 @@ ContributionMessages OrderedSums::finish(const BlockTable& blocks, std::span<con
 }
 
 template <class Real>
-void OrderedSums::add_up(std::size_t i, Real* sums, RowMask* rows) const {
+void OrderedSums::add_up(std::size_t i, const NodeColumns& columns, Real* sums, RowMask* rows) const {
   constexpr std::size_t kRow = std::size_t{kBlockWidth} * kChannels;
-  constexpr std::size_t kBlock = std::size_t{kBlockNodes} * kChannels;
   const Sum& sum = sums_[i];
-  Real* const to = sums + sum.block * kBlock;
+  const auto row_of = [&](std::uint32_t block, std::size_t row) {
+    return sums + std::size_t{columns.blocks()[block].node(static_cast<std::uint32_t>(row) * kBlockWidth)} * kChannels;
+  };
   for (std::uint32_t p = sum.first; p < sum.last; ++p) {
     const Part& part = parts_[p];
-    Real* const from = sums + part.from * kBlock;
     for (std::size_t h = 0; h < 2; ++h) {
       const auto marked = static_cast<std::uint8_t>(part.rows.half[h] | rows[part.from].half[h]);
       rows[part.from].half[h] = 0;
       rows[sum.block].half[h] = static_cast<std::uint8_t>(rows[sum.block].half[h] | marked);
       for (std::size_t row = 0; row < 8; ++row) {
         if ((marked >> row & 1U) == 0) continue;
-        const std::size_t first = (8 * h + row) * kRow;
-        for (std::size_t k = first; k < first + kRow; ++k) {
+        Real* const to = row_of(sum.block, 8 * h + row);
+        Real* const from = row_of(part.from, 8 * h + row);
+        for (std::size_t k = 0; k < kRow; ++k) {
           to[k] += from[k];
           from[k] = Real(0);
         }
@@ -128,7 +129,7 @@ void OrderedSums::add_up(std::size_t i, Real* sums, RowMask* rows) const {
   }
 }
 
-template void OrderedSums::add_up(std::size_t, float*, RowMask*) const;
-template void OrderedSums::add_up(std::size_t, double*, RowMask*) const;
+template void OrderedSums::add_up(std::size_t, const NodeColumns&, float*, RowMask*) const;
+template void OrderedSums::add_up(std::size_t, const NodeColumns&, double*, RowMask*) const;
 
 }  // namespace breccia::grid

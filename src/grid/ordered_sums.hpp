@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "grid/blocks.hpp"
+#include "grid/node_columns.hpp"
 #include "grid/tile.hpp"
 #include "mpi/halo.hpp"
 #include "mpi/standing_requests.hpp"
@@ -39,36 +40,44 @@ struct ContributionMessages {
 
 class OrderedSums {
  public:
-  /// Gives tiles that reach blocks of other ranks, shared or collected blocks blocks of their own to add to, stored
-  /// behind those of `blocks`. `stacks`: their lowest blocks; `owner(block)` is a rank; `period` as in sweep_plan.hpp.
-  /// Collective.
+  /// Gives tiles that reach columns of blocks of other ranks, shared or collected blocks columns of their own to add to,
+  /// stored behind those of `blocks`: their places are appended to `columns`. In a column of blocks either none or all
+  /// are added to in place. `stacks`: lowest blocks of the tiles; `owner(block)` is a rank; `period` as in
+  /// sweep_plan.hpp. Collective.
   template <class Owner>
   ContributionMessages connect(std::span<const Tile> tiles, std::span<const BlockKey> stacks, const BlockTable& blocks,
-                               std::span<const BlockSums> owned, std::int32_t period, Owner&& owner,
+                               NodeColumns& columns, std::span<const BlockSums> owned, std::int32_t period, Owner&& owner,
                                const mpi::Comm& comm) {
-    begin(tiles, blocks, comm.size());
+    begin(tiles, comm.size());
     for (std::uint32_t t = 0; t < tiles.size(); ++t) {
-      for (int n = 0; n < kNeighbours; ++n) {
-        const std::uint32_t block = tiles[t].neighbours[n];
-        if (block == kNoBlock || (block < owned.size() && owned[block] == BlockSums::kInPlace)) continue;
-        const Contribution c{stacks[t], blocks.keys()[block], n, sweep_turn_of(stacks[t], period)};
-        add(t, block, c, block < owned.size() ? comm.rank() : owner(block_coord(c.block)), comm.rank());
+      bool has_own = false;
+      for (int column = 0; column < kNeighbours; column += kNeighboursAlongZ) {
+        const auto first = static_cast<std::uint32_t>(columns.blocks().size());
+        int count = 0;
+        for (int n = column; n < column + kNeighboursAlongZ; ++n) {
+          const std::uint32_t block = tiles[t].neighbours[n];
+          if (block == kNoBlock || (block < owned.size() && owned[block] == BlockSums::kInPlace)) continue;
+          const Contribution c{stacks[t], blocks.keys()[block], n, sweep_turn_of(stacks[t], period)};
+          const int rank = block < owned.size() ? comm.rank() : owner(block_coord(c.block));
+          add(t, block, c, first + static_cast<std::uint32_t>(count++), rank, comm.rank());
+        }
+        if (count != 0) columns.append_run(count);
+        has_own = has_own || count != 0;
       }
+      if (has_own) set_columns(targets_[t], columns.blocks());
     }
-    return finish(blocks, owned, comm);
+    return finish(blocks, columns, owned, comm);
   }
 
   /// The tiles, with the blocks they add to as neighbours.
   [[nodiscard]] std::span<const Tile> targets() const { return targets_; }
-  /// Blocks in the array of sums, those of tiles included.
-  [[nodiscard]] std::size_t blocks() const { return end_; }
   /// How many blocks are added up: the shared ones first, then the collected ones.
   [[nodiscard]] std::size_t sums() const { return sums_.size(); }
   [[nodiscard]] std::size_t shared_sums() const { return shared_; }
 
   /// Adds up the sum `i` into its block, marks its rows and clears what it took.
   template <class Real>
-  void add_up(std::size_t i, Real* sums, RowMask* rows) const;
+  void add_up(std::size_t i, const NodeColumns& columns, Real* sums, RowMask* rows) const;
 
  private:
   struct Part {
@@ -82,15 +91,15 @@ class OrderedSums {
   };
 
   static int sweep_turn_of(BlockKey tile, std::int32_t period);
-  void begin(std::span<const Tile> tiles, const BlockTable& blocks, int ranks);
-  void add(std::uint32_t tile, std::uint32_t block, const Contribution& c, int rank, int self);
-  ContributionMessages finish(const BlockTable& blocks, std::span<const BlockSums> owned, const mpi::Comm& comm);
+  void begin(std::span<const Tile> tiles, int ranks);
+  void add(std::uint32_t tile, std::uint32_t block, const Contribution& c, std::uint32_t own, int rank, int self);
+  ContributionMessages finish(const BlockTable& blocks, NodeColumns& columns, std::span<const BlockSums> owned,
+                              const mpi::Comm& comm);
 
   std::vector<Tile> targets_;
   std::vector<Part> parts_;
   std::vector<Sum> sums_;
   std::size_t shared_ = 0;
-  std::uint32_t end_ = 0;
   std::vector<std::vector<Contribution>> given_;        // to each rank
   std::vector<std::vector<std::uint32_t>> given_from_;  // the blocks they lie in
   mpi::StandingRequests<Contribution> requests_;

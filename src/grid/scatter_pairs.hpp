@@ -3,6 +3,7 @@
 #pragma once
 
 #include "grid/stencil.hpp"
+#include "grid/tile_nodes.hpp"
 #include "grid/transfer.hpp"
 #include "grid/transpose.hpp"
 
@@ -17,9 +18,10 @@ class StencilSums {
   using Real = typename P::Real;
 
  public:
-  BRECCIA_HD explicit StencilSums(Real* origin) { load(origin); }
-  BRECCIA_HD void load(Real* origin) {
-    origin_ = in_one_register(origin);
+  BRECCIA_HD StencilSums(const TileNodes<P>& nodes, const Stencil<P>& s, int lane) { load(nodes, s, lane); }
+  BRECCIA_HD void load(const TileNodes<P>& nodes, const Stencil<P>& s, int lane) {
+    columns_ = nodes.sums + s.column(lane);
+    first_ = static_cast<std::size_t>(s.along_z(lane)) * kChannels;
     for (int p = 0; p < 2; ++p) {
       for (int i = 0; i < 3; ++i) {
         for (int j = 0; j < 3; ++j) sum_[p][i][j] = N::load(node(p, i, j));
@@ -54,16 +56,19 @@ class StencilSums {
   }
 
  private:
-  BRECCIA_HD Real* node(int p, int i, int j) const { return origin_ + tile_index(i, j, 2 * p) * kChannels; }
+  BRECCIA_HD Real* node(int p, int i, int j) const {
+    return columns_[column_index(i, j)] + first_ + 2 * p * kChannels;
+  }
 
-  Real* origin_;
+  Real* const* columns_;
+  std::size_t first_;
   N sum_[2][3][3];
 };
 
 }  // namespace detail
 
 template <class P>
-BRECCIA_HD void scatter_pairs(typename P::Real* nodes, const Stencil<P>& s, int lanes, const SpreadMomentum<P>& q) {
+BRECCIA_HD void scatter_pairs(const TileNodes<P>& nodes, const Stencil<P>& s, int lanes, const SpreadMomentum<P>& q) {
   using Real = typename P::Real;
   using T = typename P::RealPack;
   const T zero(Real(0));
@@ -84,13 +89,13 @@ BRECCIA_HD void scatter_pairs(typename P::Real* nodes, const Stencil<P>& s, int 
     value_x[l].store(row[0][l]);
     y_z[l].store(row[1][l]);
   }
-  detail::StencilSums<P> sums(nodes + s.start[0] * kChannels);
+  detail::StencilSums<P> sums(nodes, s, 0);
   for (int l = 0;;) {
     sums.add(s, l, row[0][l], row[1][l]);
     if (++l == lanes) break;
     if (s.start[l] == s.start[l - 1]) continue;
     sums.store();
-    sums.load(nodes + s.start[l] * kChannels);
+    sums.load(nodes, s, l);
   }
   sums.store();
 }

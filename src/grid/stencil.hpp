@@ -1,7 +1,7 @@
 // Quadratic B-spline weights of a pack of particles.
 #pragma once
 
-#include "grid/tile_velocities.hpp"
+#include "grid/node_velocities.hpp"
 
 namespace breccia::grid {
 
@@ -27,12 +27,18 @@ struct Stencil {
   using Real = typename P::Real;
   using T = typename P::RealPack;
   static constexpr int kAlongZ = kNodePairs<P> ? 4 : 3;
+  static constexpr int kColumnBits = 5;  ///< of start: those of z
+  static constexpr int kColumnUnit = 1 << kColumnBits;
+  static_assert(kTileHeight <= kColumnUnit);
 
   T offset[3];                                  ///< of the particle from its nearest node [cells]
   alignas(64) Real weight_xy[3][3][P::kLanes];  ///< of the column (x, y)
   alignas(64) Real weight_z[kAlongZ][P::kLanes];
   alignas(64) Real moment_z[kAlongZ][P::kLanes];  ///< only for pairs
-  alignas(64) std::int32_t start[P::kLanes];      ///< index of the first node in the tile
+  alignas(64) std::int32_t start[P::kLanes];      ///< first node: its column in the tile, times kColumnUnit, and z
+
+  /// Stencils that do not begin in `starts` are moved there.
+  BRECCIA_HD explicit Stencil(const TileBox& starts) : starts_(starts) {}
 
   /// First node along each axis of every lane.
   struct Place {
@@ -43,7 +49,7 @@ struct Stencil {
     return {stencil_start(k.node, 0), stencil_start(k.node, 1), stencil_start(k.node, 2)};
   }
 
-  /// Sets the stencil of all lanes to three nodes along z. The start of those outside the margin is made harmless.
+  /// Sets the stencil of all lanes to three nodes along z.
   BRECCIA_HD Place set(const Kinematics<P>& k) {
     const Place p = place(k);
     set_columns(k);
@@ -67,21 +73,26 @@ struct Stencil {
     }
   }
 
-  /// Lanes whose stencil reaches beyond the tile.
-  BRECCIA_HD static typename P::IntPack::Mask outside(const Place& place) {
+  /// Lanes whose stencil does not begin in the box.
+  BRECCIA_HD static typename P::IntPack::Mask outside(const Place& place, const TileBox& starts) {
     using I = typename P::IntPack;
-    const I low = min(min(place.axis[0], place.axis[1]), place.axis[2]);
-    const I high = max(max(place.axis[0], place.axis[1]), place.axis[2] - I(kTileHeight - kTileWidth));
-    return (low < I(0)) | (high > I(kTileWidth - 3));
+    const auto before = [&](int axis) BRECCIA_INLINE_LAMBDA { return place.axis[axis] < I(starts.low[axis]); };
+    const auto behind = [&](int axis) BRECCIA_INLINE_LAMBDA { return place.axis[axis] > I(starts.high[axis]); };
+    return (before(0) | before(1) | before(2)) | (behind(0) | behind(1) | behind(2));
   }
+  BRECCIA_HD typename P::IntPack::Mask outside(const Place& place) const { return outside(place, starts_); }
 
-  /// Calls visit(weight, index of the node in the tile) for the 27 nodes of a lane; after set().
+  /// The column of the first node in the tile, and its z there.
+  BRECCIA_HD int column(int lane) const { return start[lane] >> kColumnBits; }
+  BRECCIA_HD int along_z(int lane) const { return start[lane] & (kColumnUnit - 1); }
+
+  /// Calls visit(weight, column in the tile, z) for the 27 nodes of a lane; after set().
   template <class F>
   BRECCIA_HD void for_each_node(int lane, F&& visit) const {
     for (int x = 0; x < 3; ++x) {
       for (int y = 0; y < 3; ++y) {
         for (int z = 0; z < 3; ++z) {
-          visit(weight_xy[x][y][lane] * weight_z[z][lane], start[lane] + tile_index(x, y, z));
+          visit(weight_xy[x][y][lane] * weight_z[z][lane], column(lane) + column_index(x, y), along_z(lane) + z);
         }
       }
     }
@@ -111,7 +122,9 @@ struct Stencil {
 
   BRECCIA_HD void set_start(const Place& p, typename P::IntPack z) {
     using I = typename P::IntPack;
-    select(outside(p), I(0), p.axis[0] * I(kTilePlane) + p.axis[1] * I(kTileHeight) + z).store(start);
+    const I moved(column_index(starts_.low[0], starts_.low[1]) * kColumnUnit + (starts_.low[2] & ~1));
+    const I here = p.axis[0] * I(kTileWidth * kColumnUnit) + p.axis[1] * I(kColumnUnit) + z;
+    select(outside(p), moved, here).store(start);
   }
 
   BRECCIA_HD void store_pairs(const Weights& w, typename T::Mask odd) {
@@ -125,6 +138,8 @@ struct Stencil {
     select(odd, zero, w.node[2]).store(moment_z[2]);
     select(odd, w.node[2], zero).store(moment_z[3]);
   }
+
+  TileBox starts_;
 };
 
 /// Grows over the stencils of the packs of a tile.
@@ -145,19 +160,21 @@ class BoxOfStencils {
     }
   }
 
-  /// Inside the tile whatever strayed.
-  [[nodiscard]] BRECCIA_HD TileBox box() const {
+  /// The nodes of stencils that begin in `starts`.
+  [[nodiscard]] BRECCIA_HD TileBox box(const TileBox& starts) const {
     TileBox b;
     for (int axis = 0; axis < 3; ++axis) {
-      const int last = tile_extent(axis) - 3;
-      int low = last;
-      int high = 0;
+      int low = starts.high[axis];
+      int high = starts.low[axis];
       for (int l = 0; l < P::kLanes; ++l) {
         low = low_[axis][l] < low ? low_[axis][l] : low;
         high = high_[axis][l] > high ? high_[axis][l] : high;
       }
-      b.low[axis] = static_cast<std::int8_t>(low < 0 ? 0 : low);
-      b.high[axis] = static_cast<std::int8_t>((high > last ? last : high) + 2);
+      // Those that strayed have been moved there.
+      low = low < starts.low[axis] ? starts.low[axis] : low;
+      high = high > starts.high[axis] ? starts.high[axis] : high;
+      b.low[axis] = static_cast<std::int8_t>(low);
+      b.high[axis] = static_cast<std::int8_t>(high + 2);
     }
     return b;
   }

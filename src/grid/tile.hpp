@@ -3,8 +3,10 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "grid/layout.hpp"
+#include "grid/node_columns.hpp"
 #include "grid/particles.hpp"
 #include "material/constitutive.hpp"
 
@@ -19,16 +21,12 @@ inline constexpr int kTileHeight = kStackHeight + 2 * kTileMargin;  ///< nodes o
 /// Lowest block of the stack that a block belongs to.
 constexpr BlockCoord stack_of(BlockCoord b) { return {b.x, b.y, b.z & ~(kStackBlocks - 1)}; }
 
-/// Nodes from one plane x = const of a tile to the next: two more than it holds, so that no two rows of a stencil lie
-/// 4096 bytes apart: that makes loads wait for stores they have nothing to do with.
-inline constexpr int kTilePlane = kTileWidth * kTileHeight + 2;
-inline constexpr int kTileNodes = kTileWidth * kTilePlane;
-
 /// Nodes of a tile along an axis.
 constexpr int tile_extent(int axis) { return axis == 2 ? kTileHeight : kTileWidth; }
 
-/// Index of a node in a tile, coordinates from 0.
-constexpr int tile_index(int x, int y, int z) { return x * kTilePlane + y * kTileHeight + z; }
+/// Columns of nodes of a tile, and where column (x, y) stands among them.
+inline constexpr int kTileColumns = kTileWidth * kTileWidth;
+constexpr int column_index(int x, int y) { return x * kTileWidth + y; }
 
 /// The blocks around and of a stack, x slowest.
 inline constexpr int kNeighboursAlongZ = kStackBlocks + 2;
@@ -64,24 +62,50 @@ inline constexpr int kChannels = 8;
 enum SumChannel { kMomentum = 0, kForce = 3, kMass = 6 };
 enum VelocityChannel { kNewVelocity = 0, kOldVelocity = 3 };  // kMass stays where it is
 
+/// Of the velocities of a node, which come in two halves. How these lie is a matter of the kernels
+/// (node_velocities.hpp).
+inline constexpr int kVelocityChannels = kChannels / 2;
+
 template <class P>
 using Node = Pack<typename P::Real, kChannels>;
+
+/// Nodes of a tile, or of those where stencils begin: first and last of each axis.
+struct TileBox {
+  std::int8_t low[3];
+  std::int8_t high[3];
+};
+
+/// Where a stencil that lies in a tile begins.
+inline constexpr TileBox kAnyStart{{0, 0, 0}, {kTileWidth - 3, kTileWidth - 3, kTileHeight - 3}};
+
+/// The columns of a tile that lie in blocks above each other.
+struct TileColumns {
+  std::uint32_t first = 0;   ///< place of the tile's node z = 0 in the column (0, 0) of the blocks
+  std::uint32_t height = 0;  ///< places from one column to the next (node_columns.hpp)
+};
 
 struct Tile {
   std::uint32_t first_pack = 0;
   std::uint32_t particles = 0;
   std::uint32_t first_block = 0;  ///< of the blocks of its stack that it reaches and this rank owns
   std::uint32_t last_block = 0;
+  TileBox starts = kAnyStart;             ///< of the stencils of its particles until the next sorting
+  TileColumns columns[9];                 ///< of the blocks around and of the stack, x slowest
   std::uint32_t neighbours[kNeighbours];  ///< block indices; kNoBlock where it reaches no node
 };
 
-/// The nodes that the particles of a tile touched in their last scatter, first and last of each axis.
-struct TileBox {
-  std::int8_t low[3];
-  std::int8_t high[3];
-};
-
-inline constexpr TileBox kWholeTile{{0, 0, 0}, {kTileWidth - 1, kTileWidth - 1, kTileHeight - 1}};
+/// Finds the columns of a tile, from where its neighbours lie.
+inline void set_columns(Tile& tile, std::span<const BlockPlace> blocks) {
+  for (int column = 0; column < 9; ++column) {
+    for (int n = column * kNeighboursAlongZ; n < (column + 1) * kNeighboursAlongZ; ++n) {
+      const std::uint32_t block = tile.neighbours[n];
+      if (block == kNoBlock) continue;
+      const std::int32_t height_in_tile = kBlockWidth * neighbour_offset(n).z + kTileMargin;
+      tile.columns[column] = {blocks[block].first - static_cast<std::uint32_t>(height_in_tile), blocks[block].height};
+      break;
+    }
+  }
+}
 
 /// Packs of particles that no other particle can meet before the next sorting (lone_pass.hpp). They follow the tiles.
 struct LonePacks {
@@ -132,7 +156,6 @@ struct PassArguments {
   const Tile* tiles = nullptr;
   const Tile* targets = nullptr;  ///< the same tiles, with the blocks they add to as neighbours
   std::uint32_t tile_count = 0;
-  TileBox* boxes = nullptr;  ///< written by a scatter, read by the gather after it
   Kinematics<P>* kinematics = nullptr;
   Volume<P>* volume = nullptr;
   Elastic<P>* elastic = nullptr;
@@ -145,8 +168,9 @@ struct PassArguments {
   LonePacks lone;
   LonePull<P>* lone_pull = nullptr;  ///< one for each lone pack
 
-  const Real* velocities = nullptr;                ///< [blocks][64][8], VelocityChannel
-  Real* sums = nullptr;                            ///< [blocks][64][8], SumChannel
+  const Real* velocities = nullptr;                ///< as node_velocities.hpp lays them out
+  std::size_t places = 0;                          ///< of velocities
+  Real* sums = nullptr;                            ///< [places][8], SumChannel
   RowMask* rows = nullptr;                         ///< [blocks] rows that a scatter has added to
   const material::FlawCode* flaw_codes = nullptr;  ///< arena of this rank
   PassFault* fault = nullptr;
@@ -170,10 +194,10 @@ template <class P>
 struct ProbeArguments {
   using Real = typename P::Real;
   const Tile* tiles = nullptr;
-  const TileBox* boxes = nullptr;
   const Kinematics<P>* kinematics = nullptr;
   const Affine<P>* affine = nullptr;
   const Real* velocities = nullptr;
+  std::size_t places = 0;
   TransferParameters transfer;
   Real* new_velocity = nullptr;  ///< [slots][3] v_p^{n+1/2}
   Real* node_mass = nullptr;     ///< [slots] sum of w m_i
@@ -193,6 +217,8 @@ struct NodeArguments {
   using Real = typename P::Real;
   Real* sums = nullptr;
   Real* velocities = nullptr;
+  std::size_t places = 0;  ///< of velocities
+  const BlockPlace* blocks = nullptr;
   RowMask* rows = nullptr;
   Real kick = 0;           ///< dt of the kick [s]
   Real smallest_mass = 0;  ///< nodes with less are empty (hard case 2) [kg]
@@ -207,6 +233,8 @@ struct Kernels {
   void (*lone_pass)(const PassArguments<P>&, std::uint32_t first, std::uint32_t last, TileReport&);
   void (*lone_probe)(const ProbeArguments<P>&);
   void (*update_blocks)(const NodeArguments<P>&, std::uint32_t first_block, std::uint32_t last_block);
+  /// Where half `h` of the velocities at a place lies, the one that begins with v_new being 0 [halves].
+  std::uint32_t (*velocity_half)(std::uint32_t place, std::uint32_t h, std::size_t places);
 };
 
 /// Kernels of the running processor.

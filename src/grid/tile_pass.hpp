@@ -1,4 +1,4 @@
-// The pass over one tile: its nodes from the blocks, G2P and P2G on them, sums back to the blocks.
+// The pass over one tile: G2P and P2G on the nodes of the blocks around it.
 #pragma once
 
 #include "grid/pack_pass.hpp"
@@ -6,14 +6,6 @@
 #include "grid/transfer.hpp"
 
 namespace breccia::grid {
-
-/// Node values of the tile, read and written: what a layer of its particles touches fits the first-level cache.
-template <class P>
-struct TileScratch {
-  alignas(64) typename P::Real velocities[kTileNodes * kChannels];  ///< as tile_velocities.hpp lays them out
-  alignas(64) typename P::Real sums[kTileNodes * kChannels];        ///< zero before and after each tile
-  alignas(64) typename P::Real beyond[kBlockNodes * kChannels];     ///< zero
-};
 
 /// The grid of a tile as its packs see it.
 template <class P>
@@ -24,26 +16,22 @@ class TileGrid {
  public:
   static constexpr bool kKeepsGradient = false;
 
-  BRECCIA_HD TileGrid(const PassArguments<P>& arguments, TileScratch<P>& scratch) : a_(arguments), scratch_(scratch) {}
-
-  BRECCIA_HD void load(std::uint32_t tile) {
-    if (a_.gather) load_tile<P>(a_.tiles[tile], a_.boxes[tile], a_.velocities, scratch_.velocities);
+  BRECCIA_HD TileGrid(const PassArguments<P>& arguments, std::uint32_t tile)
+      : a_(arguments), target_(arguments.targets[tile]), stencil_(arguments.tiles[tile].starts) {
+    if (a_.gather) nodes_.set_velocities(a_.tiles[tile], a_.velocities, a_.places);
+    if (a_.scatter) nodes_.set_sums(target_, a_.sums);
   }
 
-  BRECCIA_HD void store(std::uint32_t tile, TileReport& report) {
+  /// After the last pack of the tile.
+  BRECCIA_HD void finish(TileReport& report) const {
     if (!a_.scatter) return;
-    a_.boxes[tile] = touched_.box();
-    mark_rows(a_.targets[tile], a_.boxes[tile], a_.rows);
-    if (add_tile<P>(a_.targets[tile], a_.boxes[tile], scratch_.sums, a_.sums, scratch_.beyond)) ++report.strayed;
-    if (strayed_) {
-      for (Real& sum : scratch_.sums) sum = Real(0);
-      ++report.strayed;
-    }
+    mark_rows(target_, touched_.box(target_.starts), a_.rows);
+    if (strayed_) ++report.strayed;
   }
 
   BRECCIA_HD GridVelocity<P> velocity(std::size_t, int lanes, const Kinematics<P>& k) {
     stencil_.set(k);
-    const GatheredVelocity<P> g = gather<P>(scratch_.velocities, stencil_, lanes);
+    const GatheredVelocity<P> g = gather<P>(nodes_, stencil_, lanes);
     const T c(Real(4) / a_.cell);  // (4 / dx^2) * dx, moments being in cells
     return {{g.updated[0], g.updated[1], g.updated[2]},
             {g.previous[0], g.previous[1], g.previous[2]},
@@ -53,9 +41,9 @@ class TileGrid {
 
   BRECCIA_HD void scatter(std::size_t i, int lanes, const Kinematics<P>& k, const PackStress<P>& s, TileReport&) {
     const auto place = stencil_.set_for_scatter(k);
-    if (any(Stencil<P>::outside(place))) strayed_ = true;
+    if (any(stencil_.outside(place))) strayed_ = true;
     touched_.add(place, k.mass);
-    grid::scatter<P>(scratch_.sums, stencil_, lanes, momentum_and_force(i, k, s));
+    grid::scatter<P>(nodes_, stencil_, lanes, momentum_and_force(i, k, s));
   }
 
  private:
@@ -74,17 +62,16 @@ class TileGrid {
   }
 
   const PassArguments<P>& a_;
-  TileScratch<P>& scratch_;
+  const Tile& target_;
+  TileNodes<P> nodes_;
   Stencil<P> stencil_;
   BoxOfStencils<P> touched_;
   bool strayed_ = false;
 };
 
 template <class P, class Fx>
-BRECCIA_HD void pass_over_tile(const PassArguments<P>& a, const Fx& fx, TileScratch<P>& scratch, std::uint32_t index,
-                               TileReport& report) {
-  TileGrid<P> grid(a, scratch);
-  grid.load(index);
+BRECCIA_HD void pass_over_tile(const PassArguments<P>& a, const Fx& fx, std::uint32_t index, TileReport& report) {
+  TileGrid<P> grid(a, index);
   PackPass<P, Fx, TileGrid<P>> packs(a, fx, grid);
   const Tile& tile = a.tiles[index];
   for (int done = 0; done < static_cast<int>(tile.particles); done += P::kLanes) {
@@ -92,7 +79,7 @@ BRECCIA_HD void pass_over_tile(const PassArguments<P>& a, const Fx& fx, TileScra
     const int pack = done / P::kLanes;
     packs.run(tile.first_pack + static_cast<std::size_t>(pack), left < P::kLanes ? left : P::kLanes, report);
   }
-  grid.store(index, report);
+  grid.finish(report);
 }
 
 }  // namespace breccia::grid

@@ -6,6 +6,7 @@
 #pragma once
 
 #include "grid/stencil.hpp"
+#include "grid/tile_nodes.hpp"
 
 namespace breccia::grid {
 
@@ -26,14 +27,6 @@ struct SpreadMomentum {
   T by_x[6], by_y[6], by_z[6];
 };
 
-/// The same pointer, as one register: else the compiler keeps base and index apart and spends an instruction on every
-/// node to add them.
-template <class T>
-BRECCIA_HD T* in_one_register(T* pointer) {
-  asm("" : "+r"(pointer));
-  return pointer;
-}
-
 /// Whether most particles of a pack have the stencil of the one before them. The end of a run is a branch nobody can
 /// predict: runs must be long for it to pay.
 template <class P>
@@ -52,7 +45,7 @@ BRECCIA_HD bool mostly_shared(const Stencil<P>& s, int lanes) {
 namespace breccia::grid {
 
 template <class P>
-BRECCIA_HD GatheredVelocity<P> gather(const typename P::Real* nodes, const Stencil<P>& s, int lanes) {
+BRECCIA_HD GatheredVelocity<P> gather(const TileNodes<P>& nodes, const Stencil<P>& s, int lanes) {
   GatheredVelocity<P> g;
   if constexpr (kNodePairs<P>) {
     gather_fours<P>(nodes, s, lanes, g);
@@ -70,7 +63,7 @@ BRECCIA_HD GatheredVelocity<P> gather(const typename P::Real* nodes, const Stenc
 
 /// Adds to the nodes of the tile. Lanes from `lanes` on are left out.
 template <class P>
-BRECCIA_HD void scatter(typename P::Real* nodes, const Stencil<P>& s, int lanes, SpreadMomentum<P>&& q) {
+BRECCIA_HD void scatter(const TileNodes<P>& nodes, const Stencil<P>& s, int lanes, SpreadMomentum<P>&& q) {
   // The linear field at the nearest node instead of at the particle.
   for (int c = 0; c < 6; ++c) {
     q.value[c] = q.value[c] - s.offset[0] * q.by_x[c] - s.offset[1] * q.by_y[c] - s.offset[2] * q.by_z[c];

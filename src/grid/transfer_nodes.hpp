@@ -2,6 +2,7 @@
 #pragma once
 
 #include "grid/stencil.hpp"
+#include "grid/tile_nodes.hpp"
 #include "grid/transfer.hpp"
 #include "grid/transpose.hpp"
 
@@ -16,15 +17,16 @@ struct NodeSums {
 };
 
 template <class P>
-BRECCIA_HD NodeSums<P> gather_lane(const typename P::Real* nodes, const Stencil<P>& s, int lane) {
+BRECCIA_HD NodeSums<P> gather_lane(const TileNodes<P>& nodes, const Stencil<P>& s, int lane) {
   using N = Node<P>;
-  const typename P::Real* origin = nodes + s.start[lane] * kChannels;
+  const typename P::Real* const* const columns = nodes.velocities + s.column(lane);
   N plane[3], plane_x[3], plane_y[3];
   for (int k = 0; k < 3; ++k) {
+    const auto first = static_cast<std::size_t>(s.along_z(lane) + k) * kChannels;
     N low[3], high[3], along_x[3];
     for (int i = 0; i < 3; ++i) {
       const auto term = [&](int j) BRECCIA_INLINE_LAMBDA {
-        return N(s.weight_xy[i][j][lane]) * N::load(origin + tile_index(i, j, k) * kChannels);
+        return N(s.weight_xy[i][j][lane]) * N::load(columns[column_index(i, j)] + first);
       };
       low[i] = term(0);
       high[i] = term(2);
@@ -42,14 +44,15 @@ BRECCIA_HD NodeSums<P> gather_lane(const typename P::Real* nodes, const Stencil<
 /// Lanes `first` to `last` - 1, which have one stencil: its nodes are read and written once for all of them, as reading
 /// what has just been written is slow. `rows`: value and slopes along x, y, z of each lane.
 template <class P>
-BRECCIA_HD void scatter_run(typename P::Real* nodes, const Stencil<P>& s, int first, int last,
+BRECCIA_HD void scatter_run(const TileNodes<P>& nodes, const Stencil<P>& s, int first, int last,
                             const Node<P> (&rows)[4][P::kLanes]) {
   using N = Node<P>;
   for (int k = 0; k < 3; ++k) {
-    typename P::Real* origin = in_one_register(nodes + (s.start[first] + tile_index(0, 0, k)) * kChannels);
+    typename P::Real* const* const columns = nodes.sums + s.column(first);
+    const auto at = static_cast<std::size_t>(s.along_z(first) + k) * kChannels;
     N sum[3][3];
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) sum[i][j] = N::load(origin + tile_index(i, j, 0) * kChannels);
+      for (int j = 0; j < 3; ++j) sum[i][j] = N::load(columns[column_index(i, j)] + at);
     }
     for (int l = first; l < last; ++l) {
       const N wz(s.weight_z[k][l]);
@@ -64,7 +67,7 @@ BRECCIA_HD void scatter_run(typename P::Real* nodes, const Stencil<P>& s, int fi
       }
     }
     for (int i = 0; i < 3; ++i) {
-      for (int j = 0; j < 3; ++j) sum[i][j].store(origin + tile_index(i, j, 0) * kChannels);
+      for (int j = 0; j < 3; ++j) sum[i][j].store(columns[column_index(i, j)] + at);
     }
   }
 }
@@ -72,7 +75,7 @@ BRECCIA_HD void scatter_run(typename P::Real* nodes, const Stencil<P>& s, int fi
 }  // namespace detail
 
 template <class P>
-BRECCIA_HD void gather_nodes(const typename P::Real* nodes, const Stencil<P>& s, int lanes, GatheredVelocity<P>& g) {
+BRECCIA_HD void gather_nodes(const TileNodes<P>& nodes, const Stencil<P>& s, int lanes, GatheredVelocity<P>& g) {
   using T = typename P::RealPack;
   Node<P> value[P::kLanes];
   Node<P> xy[P::kLanes];
@@ -98,7 +101,7 @@ BRECCIA_HD void gather_nodes(const typename P::Real* nodes, const Stencil<P>& s,
 }
 
 template <class P>
-BRECCIA_HD void scatter_nodes(typename P::Real* nodes, const Stencil<P>& s, int lanes, const SpreadMomentum<P>& q) {
+BRECCIA_HD void scatter_nodes(const TileNodes<P>& nodes, const Stencil<P>& s, int lanes, const SpreadMomentum<P>& q) {
   using T = typename P::RealPack;
   const T zero(typename P::Real(0));
   const T value[8] = {q.value[0], q.value[1], q.value[2], q.value[3], q.value[4], q.value[5], q.value[6], zero};
