@@ -69,6 +69,7 @@ PassArguments<P> HostEngine<P>::pass_arguments(double step, double half_step) {
   a.uniform_gravity = {static_cast<Real>(setup_.uniform_gravity.x), static_cast<Real>(setup_.uniform_gravity.y),
                        static_cast<Real>(setup_.uniform_gravity.z)};
   a.transfer = transfer_;
+  a.adds_by_tile = setup_.numerics.reproducible;
   return a;
 }
 

@@ -15,7 +15,7 @@ void NodeColumns::lay_out(std::span<const BlockKey> keys) {
     // z is in the lowest bits of a key.
     std::size_t last = first + 1;
     while (last < order.size() && keys[order[last]] == keys[order[last - 1]] + 1) ++last;
-    const auto height = static_cast<std::uint32_t>(last - first) * kBlockWidth + kGap;
+    const auto height = height_of(static_cast<std::uint32_t>(last - first));
     for (std::size_t n = first; n < last; ++n) {
       blocks_[order[n]] = {end_ + static_cast<std::uint32_t>(n - first) * kBlockWidth, height};
     }
@@ -25,7 +25,7 @@ void NodeColumns::lay_out(std::span<const BlockKey> keys) {
 }
 
 void NodeColumns::append_run(int count) {
-  const std::uint32_t height = static_cast<std::uint32_t>(count) * kBlockWidth + kGap;
+  const std::uint32_t height = height_of(static_cast<std::uint32_t>(count));
   for (std::uint32_t n = 0; n < static_cast<std::uint32_t>(count); ++n) blocks_.push_back({end_ + n * kBlockWidth, height});
   end_ += kBlockWidth * kBlockWidth * height;
 }

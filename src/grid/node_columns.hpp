@@ -34,9 +34,12 @@ class NodeColumns {
   [[nodiscard]] std::size_t places() const { return std::size_t{end_} + kBeyond; }
 
  private:
-  /// An odd number of pairs of nodes, so that the columns of a stencil fall on different lines of the cache, and no two
-  /// lie 4096 bytes apart: that makes loads wait for stores they have nothing to do with.
-  static constexpr std::uint32_t kGap = 2;
+  static constexpr std::uint32_t height_of(std::uint32_t blocks) {
+    // No two columns of a stencil shall lie 4096 bytes apart: that makes loads wait for stores they have nothing to do
+    // with. Pairs of nodes remain a line of the cache.
+    const std::uint32_t gap = blocks % 4 == 0 ? 2 : 0;
+    return blocks * kBlockWidth + gap;
+  }
   static constexpr std::uint32_t kBefore = 20;  ///< a tile counts from its lowest node, whether it exists or not
   static constexpr std::uint32_t kBeyond = 4;
 

@@ -1,7 +1,7 @@
-// Sums that do not depend on how the grid is cut (numerics.reproducible): one rank alone adds the tiles that reach a
-// node in the order of their turns and keys (sweep_plan.hpp). Where slabs meet, and where the boundary tiles run before
-// others that should have come first, every tile therefore adds to blocks of its own, and the owner of a block adds up
-// what tiles gave to it in that same order.
+// Sums that do not depend on how the grid is cut (numerics.reproducible): what a tile gives to a node is added up first,
+// and one rank alone adds the tiles that reach a node in the order of their turns and keys (sweep_plan.hpp). Where slabs
+// meet, and where the boundary tiles run before others that should have come first, every tile therefore adds to blocks
+// of its own, and the owner of a block adds up what tiles gave to it in that same order.
 #pragma once
 
 #include <cstdint>

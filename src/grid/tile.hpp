@@ -185,8 +185,9 @@ struct PassArguments {
   Vec3<Real> uniform_gravity{};
   TransferParameters transfer;
 
-  bool gather = true;   ///< G2P and particle update
-  bool scatter = true;  ///< stress and P2G
+  bool gather = true;         ///< G2P and particle update
+  bool scatter = true;        ///< stress and P2G
+  bool adds_by_tile = false;  ///< what a tile gives to a node is added up first (ordered_sums.hpp)
 };
 
 /// What the output step reads from the grid, without changing anything.

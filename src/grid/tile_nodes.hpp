@@ -25,6 +25,19 @@ struct TileNodes {
     for_each_column(
         tile, [&](int column, std::size_t place) BRECCIA_INLINE_LAMBDA { sums[column] = all + place * kChannels; });
   }
+  /// In place of these: sums of the tile alone, [kTileColumns][kTileHeight][kChannels] zeros.
+  BRECCIA_HD void set_sums_apart(Real* apart) {
+    for (int column = 0; column < kTileColumns; ++column) sums[column] = apart + column * kTileHeight * kChannels;
+  }
+  /// Moves them to where set_sums would have put them; `box`: the nodes that may have got something.
+  BRECCIA_HD void add_sums(const Tile& tile, const TileBox& box, Real* all) const {
+    for_each_column(tile, [&](int column, std::size_t place) BRECCIA_INLINE_LAMBDA {
+      for (int n = box.low[2] * kChannels; n < (box.high[2] + 1) * kChannels; ++n) {
+        all[place * kChannels + static_cast<std::size_t>(n)] += sums[column][n];
+        sums[column][n] = Real(0);
+      }
+    });
+  }
 
  private:
   template <class F>

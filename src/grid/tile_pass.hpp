@@ -19,13 +19,16 @@ class TileGrid {
   BRECCIA_HD TileGrid(const PassArguments<P>& arguments, std::uint32_t tile)
       : a_(arguments), target_(arguments.targets[tile]), stencil_(arguments.tiles[tile].starts) {
     if (a_.gather) nodes_.set_velocities(a_.tiles[tile], a_.velocities, a_.places);
-    if (a_.scatter) nodes_.set_sums(target_, a_.sums);
+    if (a_.scatter && !a_.adds_by_tile) nodes_.set_sums(target_, a_.sums);
+    if (a_.scatter && a_.adds_by_tile) nodes_.set_sums_apart(sums_apart());
   }
 
   /// After the last pack of the tile.
   BRECCIA_HD void finish(TileReport& report) const {
     if (!a_.scatter) return;
-    mark_rows(target_, touched_.box(target_.starts), a_.rows);
+    const TileBox box = touched_.box(target_.starts);
+    if (a_.adds_by_tile) nodes_.add_sums(target_, box, a_.sums);
+    mark_rows(target_, box, a_.rows);
     if (strayed_) ++report.strayed;
   }
 
@@ -47,6 +50,11 @@ class TileGrid {
   }
 
  private:
+  static Real* sums_apart() {
+    alignas(64) static thread_local Real sums[kTileColumns * kTileHeight * kChannels];
+    return sums;
+  }
+
   // Of each lane: value + gradient * (x_i - x_p).
   BRECCIA_HD SpreadMomentum<P> momentum_and_force(std::size_t i, const Kinematics<P>& k, const PackStress<P>& s) const {
     const T affine = a_.transfer.affine ? k.mass * T(a_.cell) : T(Real(0));

@@ -17,7 +17,7 @@ namespace {
 constexpr double kCell = 2500.0;
 constexpr double kMass = 5e12;
 constexpr double kStep = 0.1;
-constexpr int kEdge = 24;  // cells of the cube, whole blocks
+constexpr int kEdge = 28;  // cells of the cube, whole blocks
 
 // Broken rock: a cube with 8 particles in each cell, every particle with a velocity of its own. `far`: pairs of
 // particles elsewhere, which have many nodes for themselves and meet nothing.
