@@ -10,11 +10,10 @@
 namespace breccia::grid {
 namespace {
 
-// One core of a Xeon with AVX-512, `breccia_bench work`: within 5 % of the time of full and half full tiles, in double
-// a fifth below that of thin ones, up to two thirds above that of tiles with one particle. Damage that may grow or not
-// makes no difference.
-constexpr WorkWeights kHostMixed{.tile = 2000e3, .pack = 600e3, .lone_pack = 160e3};
-constexpr WorkWeights kHostDouble{.tile = 4800e3, .pack = 440e3, .lone_pack = 160e3};
+// One core of a Xeon with AVX-512, `breccia_bench work`: within 8 % of the time of full, half full and thin tiles, up to a
+// half above that of tiles with one particle. Damage that may grow or not makes no difference.
+constexpr WorkWeights kHostMixed{.tile = 1700e3, .pack = 510e3, .lone_pack = 160e3};
+constexpr WorkWeights kHostDouble{.tile = 3900e3, .pack = 435e3, .lone_pack = 160e3};
 
 template <class P>
 constexpr WorkWeights kWeights = std::is_same_v<P, MixedPrecision> ? kHostMixed : kHostDouble;

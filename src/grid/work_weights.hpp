@@ -3,7 +3,7 @@
 
 namespace breccia::grid {
 
-/// Cost of one step [ps]. A tile costs by itself (its nodes are copied and updated), and its particles by the pack.
+/// Cost of one step [ps]. A tile costs by itself (its nodes are fetched and updated), and its particles by the pack.
 struct WorkWeights {
   double tile;       ///< that holds particles
   double pack;       ///< of particles in a tile, full or not

@@ -35,6 +35,7 @@ class Threads : public testing::TestWithParam<const char*> {
 TEST_P(Threads, GiveTheSameCollision) { expect_same(collision(9e3)); }
 TEST_P(Threads, GiveTheSameOnAPeriodicAxis) {
   for (const int blocks : {1, 3, 4}) expect_same(periodic_slide(blocks));
+  for (const int blocks : {1, 5}) expect_same(periodic_slide(blocks, 2));
 }
 
 INSTANTIATE_TEST_SUITE_P(Precisions, Threads, testing::Values("mixed", "double"));

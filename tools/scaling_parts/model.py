@@ -20,7 +20,7 @@ RIM = 0.25
 PHASES = 16
 MARGIN = 2  # nodes that a particle reaches beyond the nearest one until the next sorting
 STACK = 4  # blocks of a tile of the host engine, along z
-# Particles that cost as much as a tile does with its half empty last pack, on a host core: 2.0 us and 8 lanes of 37.5 ns, by
+# Particles that cost as much as a tile does with its half empty last pack, on a host core: 1.7 us and 8 lanes of 32 ns, by
 # which the program cuts (docs/scaling.md, "Balance").
 TILE = 61.0
 # Share of a padded mesh that a transposition moves: halves that are zero stay where they are. From the bytes that four
