@@ -1,6 +1,6 @@
-// Gather with four nodes per register, four channels each: the velocities of the nodes lie in two arrays for it, so that
-// the three nodes of a stencil along z are one load of either (node_velocities.hpp). Nothing but the weights is the
-// particle's own until the sums over x and y are done.
+// Gather with four nodes per register, four channels each: the velocities of the nodes lie in two arrays for it, so
+// that the three nodes of a stencil along z are one load of either (node_velocities.hpp). Nothing but the weights is
+// the particle's own until the sums over x and y are done.
 #pragma once
 
 #include "grid/stencil.hpp"

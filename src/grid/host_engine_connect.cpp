@@ -1,7 +1,6 @@
 // After sorting: which blocks a tile reaches, which nodes are shared with other ranks, which tiles are of the boundary.
 #include <algorithm>
 #include <bit>
-#include <unordered_set>
 
 #include "grid/host_engine.hpp"
 
@@ -68,27 +67,29 @@ std::array<std::uint32_t, kNeighbours> reached_planes(const ParticleStore<P>& st
   return planes;
 }
 
-// Where stencils of the particles may begin: a node before theirs, and a node further as they drift.
+// Where stencils of the particles may begin: all their nodes lie in blocks that are reached.
 TileBox reached_starts(const OccupiedCells& cells) {
   TileBox starts{};
   for (int axis = 0; axis < 3; ++axis) {
-    const std::uint16_t occupied = cells.axis[axis];
-    starts.low[axis] = static_cast<std::int8_t>(std::countr_zero(occupied) + kTileMargin - 2);
-    starts.high[axis] = static_cast<std::int8_t>(std::bit_width(occupied) - 1 + kTileMargin);
+    const unsigned reached = reached_blocks(cells.axis[axis], axis == 2 ? kStackBlocks : 1);
+    const auto first_node = [](int slot) { return kBlockWidth * (slot - 1) + kTileMargin; };
+    const int low = std::max(first_node(std::countr_zero(reached)), 0);
+    const int high = std::min(first_node(std::bit_width(reached)), tile_extent(axis)) - 3;
+    starts.low[axis] = static_cast<std::int8_t>(low);
+    starts.high[axis] = static_cast<std::int8_t>(high);
   }
   return starts;
 }
 
-// In columns all blocks are collected if one is not added to in place: a tile adds to whole columns.
-void collect_whole_columns(std::span<const BlockKey> keys, std::span<BlockSums> owned) {
-  std::unordered_set<BlockKey> columns;
-  const auto column_of = [](BlockKey key) { return key & ~((BlockKey{1} << 21) - 1); };
-  for (std::size_t b = 0; b < keys.size(); ++b) {
-    if (b >= owned.size() || owned[b] != BlockSums::kInPlace) columns.insert(column_of(keys[b]));
-  }
-  for (std::size_t b = 0; b < owned.size(); ++b) {
-    if (owned[b] == BlockSums::kInPlace && columns.contains(column_of(keys[b]))) owned[b] = BlockSums::kCollected;
-  }
+// Of blocks that share their columns all are collected if one is not added to in place: a tile adds to whole columns.
+void collect_whole_columns(const NodeColumns& columns, std::span<BlockSums> owned) {
+  columns.for_each_run([&](std::span<const std::uint32_t> run) {
+    const auto in_place = [&](std::uint32_t b) { return b < owned.size() && owned[b] == BlockSums::kInPlace; };
+    if (std::ranges::all_of(run, in_place)) return;
+    for (const std::uint32_t b : run) {
+      if (in_place(b)) owned[b] = BlockSums::kCollected;
+    }
+  });
 }
 
 // One request for each block, in the order of their keys.
@@ -129,7 +130,8 @@ std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
       const std::uint32_t foreign = planes[static_cast<std::size_t>(n)] & ~own_planes(b);
       for (std::int32_t plane = 0; plane < kBlockWidth; ++plane) {
         if ((foreign >> plane & 1U) == 0) continue;
-        of_rank[static_cast<std::size_t>(slabs_.owner(first_plane(periodicity_.wrap(b)) + plane))].push_back({block_key(b), 1U << plane});
+        of_rank[static_cast<std::size_t>(slabs_.owner(first_plane(periodicity_.wrap(b)) + plane))].push_back(
+            {block_key(b), 1U << plane});
       }
     }
   }
@@ -180,9 +182,8 @@ void HostEngine<P>::connect_tiles() {
   }
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::fill(std::begin(tiles_[t].neighbours), std::end(tiles_[t].neighbours), kNoBlock);
-    for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord b) {
-      tiles_[t].neighbours[n] = blocks_.insert(block_key(stored(b)));
-    });
+    for_each_reached(occupied_cells_[t], stacks_[t],
+                     [&](int n, BlockCoord b) { tiles_[t].neighbours[n] = blocks_.insert(block_key(stored(b))); });
   }
   columns_.lay_out(blocks_.keys());
   node_places_ = columns_.places();
@@ -241,7 +242,7 @@ void HostEngine<P>::connect_halo() {
         }
       }
     }
-    collect_whole_columns(blocks_.keys(), block_sums_);
+    collect_whole_columns(columns_, block_sums_);
     ContributionMessages messages = ordered_.connect(
         tiles_, stacks_, blocks_, columns_, block_sums_, periodicity_.blocks[0],
         [&](BlockCoord b) { return slabs_.owner(first_plane(periodicity_.wrap(b))); }, comm_);

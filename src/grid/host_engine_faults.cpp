@@ -43,7 +43,7 @@ template <class P>
 std::optional<ParticleSample> HostEngine<P>::fastest() const {
   std::optional<ParticleSample> worst;
   double most = -1.0;
-  for_each_particle([&](std::size_t slot, BlockCoord block) {
+  const auto consider = [&](std::size_t slot, BlockCoord block, const TileBox& starts) {
     const std::size_t pack = slot / kLanes;
     const int lane = static_cast<int>(slot % kLanes);
     const std::int32_t node = store_.kinematics[pack].node[lane];
@@ -51,14 +51,22 @@ std::optional<ParticleSample> HostEngine<P>::fastest() const {
     bool outside = false;
     for (int axis = 0; axis < 3; ++axis) {
       speed = std::max(speed, std::abs(static_cast<double>(store_.kinematics[pack].velocity[axis][lane])));
-      const int place = ((node >> (8 * axis)) & 255) - kNodeBias;
-      outside = outside || place < -1 || place > tile_extent(axis) - 2 * kTileMargin;
+      const int start = ((node >> (8 * axis)) & 255) - kNodeBias + kTileMargin - 1;
+      outside = outside || start < starts.low[axis] || start > starts.high[axis];
     }
     if (outside) speed = HUGE_VAL;
     if (!(speed > most)) return;
     most = speed;
     worst = sample(slot, block);
-  });
+  };
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    for (std::uint32_t n = 0; n < tiles_[t].particles; ++n) {
+      consider(tiles_[t].first_pack * kLanes + n, block_coord(stacks_[t]), tiles_[t].starts);
+    }
+  }
+  for (std::uint32_t n = 0; n < lone_.particles; ++n) {
+    consider(lone_.first_pack * kLanes + n, lone_stack_[n], kAnyStart);
+  }
   return worst;
 }
 

@@ -31,6 +31,7 @@ void HostEngine<P>::update_shared(const NodeArguments<P>& arguments) {
   noted("shared nodes", [&] {
     sum_exchange_.add_received(sums_.data());
     for (std::size_t n = 0; n < ordered_.shared_sums(); ++n) ordered_.add_up(n, columns_, sums_.data(), rows_.data());
+    for (const PeriodImages::Image& image : images_.shared()) rows_[image.block] = kAllRows;  // what came has no marks
     images_.fold(images_.shared(), columns_, sums_.data(), rows_.data());
     for (std::uint32_t b = 0; b < owned_blocks_; ++b) {
       if (block_sums_[b] != BlockSums::kShared) continue;
@@ -66,7 +67,8 @@ void HostEngine<P>::copy_to_images(std::span<const PeriodImages::Image> images) 
     for (std::uint32_t n = 0; n < kBlockNodes; ++n) {
       for (std::uint32_t h = 0; h < 2; ++h) {
         const auto half = [&](std::uint32_t block) {
-          return velocities_.data() + std::size_t{velocity_half(columns_.blocks()[block].node(n), h)} * kVelocityChannels;
+          return velocities_.data() +
+                 std::size_t{velocity_half(columns_.blocks()[block].node(n), h)} * kVelocityChannels;
         };
         std::copy_n(half(image.original), kVelocityChannels, half(image.block));
       }

@@ -10,8 +10,8 @@
 namespace breccia::grid {
 namespace {
 
-// One core of a Xeon with AVX-512, `breccia_bench work`: within 8 % of the time of full, half full and thin tiles, up to a
-// half above that of tiles with one particle. Damage that may grow or not makes no difference.
+// One core of a Xeon with AVX-512, `breccia_bench work`: within 8 % of the time of full, half full and thin tiles, up
+// to a half above that of tiles with one particle. Damage that may grow or not makes no difference.
 constexpr WorkWeights kHostMixed{.tile = 1700e3, .pack = 510e3, .lone_pack = 160e3};
 constexpr WorkWeights kHostDouble{.tile = 3900e3, .pack = 435e3, .lone_pack = 160e3};
 

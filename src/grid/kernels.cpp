@@ -5,6 +5,13 @@
 namespace breccia::grid::BRECCIA_ISA {
 namespace {
 
+// Of a tile whose sums are added up apart from the grid; zero between two tiles.
+template <class P>
+typename P::Real* sums_apart() {
+  alignas(64) static thread_local typename P::Real sums[kTileColumns * kTileHeight * kChannels];
+  return sums;
+}
+
 template <class Fx>
 bool matches(const material::RuntimeEffects& fx) {
   return fx.shear == Fx::shear && fx.strength == Fx::strength && fx.damage == Fx::damage &&
@@ -26,7 +33,7 @@ BRECCIA_HD void specialised(const material::RuntimeEffects& fx, F&& run) {
 template <class P>
 void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
   specialised(a.effects,
-              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, tile, report); });
+              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, sums_apart<P>(), tile, report); });
 }
 
 template <class P>
@@ -137,8 +144,8 @@ std::uint32_t velocity_half(std::uint32_t place, std::uint32_t h, std::size_t pl
 
 template <class P>
 const Kernels<P>& kernels() {
-  static constexpr Kernels<P> table{&pass<P>, &probe<P>, &lone_pass<P>, &lone_probe<P>,
-                                      &update_blocks<P>, &velocity_half<P>};
+  static constexpr Kernels<P> table{&pass<P>,       &probe<P>,         &lone_pass<P>,
+                                    &lone_probe<P>, &update_blocks<P>, &velocity_half<P>};
   return table;
 }
 template const Kernels<MixedPrecision>& kernels<MixedPrecision>();

@@ -2,6 +2,7 @@
 // that the nodes of a stencil along z follow each other wherever it lies, and particles read and add to them in place.
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -22,28 +23,45 @@ struct BlockPlace {
   [[nodiscard]] constexpr std::uint32_t node(std::uint32_t n) const { return node(n / 16, n / 4 % 4, n % 4); }
 };
 
+/// Heights and first places are even: pairs of nodes are lines of the cache.
 class NodeColumns {
  public:
-  /// Gives places to the nodes of blocks: the places of block i are those of keys[i].
+  /// Places before the first column: a tile counts from its lowest node, whether that exists or not.
+  static constexpr std::uint32_t kBefore = 20;
+  /// Places beyond the last column, so that a load of four nodes may begin at any.
+  static constexpr std::uint32_t kBeyond = 4;
+
+  /// `node_bytes`: of the sums of a node.
+  explicit NodeColumns(std::size_t node_bytes) : node_bytes_(node_bytes) {}
+
+  /// Gives places to the nodes of blocks: the places of block i are those of keys[i]. Throws NumericsError beyond 2^31
+  /// places.
   void lay_out(std::span<const BlockKey> keys);
-  /// Appends `count` blocks above each other, apart from all others: theirs are the next indices.
+  /// Appends `count` blocks above each other, apart from all others: theirs are the next indices. Throws as lay_out.
   void append_run(int count);
 
   [[nodiscard]] std::span<const BlockPlace> blocks() const { return blocks_; }
-  /// Places in all; some beyond the last column, so that a load of four nodes may begin at any.
   [[nodiscard]] std::size_t places() const { return std::size_t{end_} + kBeyond; }
 
- private:
-  static constexpr std::uint32_t height_of(std::uint32_t blocks) {
-    // No two columns of a stencil shall lie 4096 bytes apart: that makes loads wait for stores they have nothing to do
-    // with. Pairs of nodes remain a line of the cache.
-    const std::uint32_t gap = blocks % 4 == 0 ? 2 : 0;
-    return blocks * kBlockWidth + gap;
+  /// Calls visit(indices) for the blocks laid out that share their columns.
+  template <class F>
+  void for_each_run(F&& visit) const {
+    std::size_t first = 0;
+    for (const std::size_t last : run_ends_) {
+      visit(std::span(in_order_).subspan(first, last - first));
+      first = last;
+    }
   }
-  static constexpr std::uint32_t kBefore = 20;  ///< a tile counts from its lowest node, whether it exists or not
-  static constexpr std::uint32_t kBeyond = 4;
 
+ private:
+  [[nodiscard]] std::uint32_t height_of(std::size_t blocks) const;
+  // The columns of so many blocks at the end.
+  [[nodiscard]] BlockPlace add_columns(std::size_t blocks);
+
+  std::size_t node_bytes_;
   std::vector<BlockPlace> blocks_;
+  std::vector<std::uint32_t> in_order_;  // of keys
+  std::vector<std::size_t> run_ends_;    // in in_order_
   std::uint32_t end_ = kBefore;
 };
 

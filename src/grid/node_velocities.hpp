@@ -1,5 +1,5 @@
-// How the velocities of the nodes lie in memory. Where two nodes fill a register, they lie in two arrays of four channels,
-// the second behind the whole of the first: v_new with x of v_old, and [z of v_old, 0, mass, y of v_old]
+// How the velocities of the nodes lie in memory. Where two nodes fill a register, they lie in two arrays of four
+// channels, the second behind the whole of the first: v_new with x of v_old, and [z of v_old, 0, mass, y of v_old]
 // (gather_fours.hpp). Else a node keeps its channels together, as its sums do.
 #pragma once
 
@@ -27,11 +27,11 @@ template <class P>
 inline constexpr int kVelocityStride = kNodePairs<P> ? kVelocityChannels : kChannels;
 
 /// From the first array to the second [reals]; `places` of all velocities.
-constexpr std::size_t rest_distance(std::size_t places) { return places * kVelocityChannels; }
+BRECCIA_HD constexpr std::size_t rest_distance(std::size_t places) { return places * kVelocityChannels; }
 
 /// Where the mass of a node lies, from where its velocities do.
 template <class P>
-constexpr std::size_t mass_distance(std::size_t places) {
+BRECCIA_HD constexpr std::size_t mass_distance(std::size_t places) {
   return kNodePairs<P> ? rest_distance(places) + kRestMass : std::size_t{kMass};
 }
 

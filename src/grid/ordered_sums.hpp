@@ -1,7 +1,7 @@
-// Sums that do not depend on how the grid is cut (numerics.reproducible): what a tile gives to a node is added up first,
-// and one rank alone adds the tiles that reach a node in the order of their turns and keys (sweep_plan.hpp). Where slabs
-// meet, and where the boundary tiles run before others that should have come first, every tile therefore adds to blocks
-// of its own, and the owner of a block adds up what tiles gave to it in that same order.
+// Sums that do not depend on how the grid is cut (numerics.reproducible): what a tile gives to a node is added up
+// first, and one rank alone adds the tiles that reach a node in the order of their turns and keys (sweep_plan.hpp).
+// Where slabs meet, and where the boundary tiles run before others that should have come first, every tile therefore
+// adds to blocks of its own, and the owner of a block adds up what tiles gave to it in that same order.
 #pragma once
 
 #include <cstdint>
@@ -40,14 +40,14 @@ struct ContributionMessages {
 
 class OrderedSums {
  public:
-  /// Gives tiles that reach columns of blocks of other ranks, shared or collected blocks columns of their own to add to,
-  /// stored behind those of `blocks`: their places are appended to `columns`. In a column of blocks either none or all
-  /// are added to in place. `stacks`: lowest blocks of the tiles; `owner(block)` is a rank; `period` as in
+  /// Gives tiles that reach columns of blocks of other ranks, shared or collected blocks columns of their own to add
+  /// to, stored behind those of `blocks`: their places are appended to `columns`. In a column of blocks either none or
+  /// all are added to in place. `stacks`: lowest blocks of the tiles; `owner(block)` is a rank; `period` as in
   /// sweep_plan.hpp. Collective.
   template <class Owner>
   ContributionMessages connect(std::span<const Tile> tiles, std::span<const BlockKey> stacks, const BlockTable& blocks,
-                               NodeColumns& columns, std::span<const BlockSums> owned, std::int32_t period, Owner&& owner,
-                               const mpi::Comm& comm) {
+                               NodeColumns& columns, std::span<const BlockSums> owned, std::int32_t period,
+                               Owner&& owner, const mpi::Comm& comm) {
     begin(tiles, comm.size());
     for (std::uint32_t t = 0; t < tiles.size(); ++t) {
       bool has_own = false;

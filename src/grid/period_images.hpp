@@ -1,5 +1,5 @@
-// Blocks beyond the period of an axis along columns: a column goes on there, though its nodes are those of the other end.
-// What is added to them goes to the nodes of the period before the grid update, and velocities come back after it.
+// Blocks beyond the period of an axis along columns: a column goes on there, though its nodes are those of the other
+// end. What is added to them goes to the nodes of the period before the grid update, and velocities come back after it.
 #pragma once
 
 #include <cstdint>

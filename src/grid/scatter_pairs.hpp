@@ -56,9 +56,7 @@ class StencilSums {
   }
 
  private:
-  BRECCIA_HD Real* node(int p, int i, int j) const {
-    return columns_[column_index(i, j)] + first_ + 2 * p * kChannels;
-  }
+  BRECCIA_HD Real* node(int p, int i, int j) const { return columns_[column_index(i, j)] + first_ + 2 * p * kChannels; }
 
   Real* const* columns_;
   std::size_t first_;

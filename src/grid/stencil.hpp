@@ -37,7 +37,7 @@ struct Stencil {
   alignas(64) Real moment_z[kAlongZ][P::kLanes];  ///< only for pairs
   alignas(64) std::int32_t start[P::kLanes];      ///< first node: its column in the tile, times kColumnUnit, and z
 
-  /// Stencils that do not begin in `starts` are moved there.
+  /// Stencils that do not begin in `starts` are moved to its lowest node.
   BRECCIA_HD explicit Stencil(const TileBox& starts) : starts_(starts) {}
 
   /// First node along each axis of every lane.
@@ -122,7 +122,7 @@ struct Stencil {
 
   BRECCIA_HD void set_start(const Place& p, typename P::IntPack z) {
     using I = typename P::IntPack;
-    const I moved(column_index(starts_.low[0], starts_.low[1]) * kColumnUnit + (starts_.low[2] & ~1));
+    const I moved(column_index(starts_.low[0], starts_.low[1]) * kColumnUnit + starts_.low[2]);
     const I here = p.axis[0] * I(kTileWidth * kColumnUnit) + p.axis[1] * I(kColumnUnit) + z;
     select(outside(p), moved, here).store(start);
   }
@@ -170,7 +170,7 @@ class BoxOfStencils {
         low = low_[axis][l] < low ? low_[axis][l] : low;
         high = high_[axis][l] > high ? high_[axis][l] : high;
       }
-      // Those that strayed have been moved there.
+      // What strayed is not there.
       low = low < starts.low[axis] ? starts.low[axis] : low;
       high = high > starts.high[axis] ? starts.high[axis] : high;
       b.low[axis] = static_cast<std::int8_t>(low);

@@ -75,6 +75,8 @@ struct TileBox {
   std::int8_t high[3];
 };
 
+static_assert(NodeColumns::kBefore >= kStackHeight + kTileMargin && NodeColumns::kBefore % 2 == 0);
+
 /// Where a stencil that lies in a tile begins.
 inline constexpr TileBox kAnyStart{{0, 0, 0}, {kTileWidth - 3, kTileWidth - 3, kTileHeight - 3}};
 
@@ -89,7 +91,7 @@ struct Tile {
   std::uint32_t particles = 0;
   std::uint32_t first_block = 0;  ///< of the blocks of its stack that it reaches and this rank owns
   std::uint32_t last_block = 0;
-  TileBox starts = kAnyStart;             ///< of the stencils of its particles until the next sorting
+  TileBox starts = kAnyStart;             ///< of stencils all whose nodes exist; low along z is even
   TileColumns columns[9];                 ///< of the blocks around and of the stack, x slowest
   std::uint32_t neighbours[kNeighbours];  ///< block indices; kNoBlock where it reaches no node
 };

@@ -6,7 +6,8 @@
 namespace breccia::grid {
 
 /// Where the columns that stencils of a tile reach begin, z = 0 of the tile. Stencils that begin in Tile::starts reach
-/// only nodes that exist, but for a fourth node of weight 0 beyond them, where memory is.
+/// only nodes that exist. A gather loads a fourth node along z and drops it: it may be that of a column far away, which
+/// another thread is just changing.
 template <class P>
 struct TileNodes {
   using Real = typename P::Real;
@@ -17,9 +18,8 @@ struct TileNodes {
 
   BRECCIA_HD void set_velocities(const Tile& tile, const Real* all, std::size_t places) {
     rest = rest_distance(places);
-    for_each_column(tile, [&](int column, std::size_t place) BRECCIA_INLINE_LAMBDA {
-      velocities[column] = all + place * kVelocityStride<P>;
-    });
+    for_each_column(tile, [&](int column, std::size_t place)
+                              BRECCIA_INLINE_LAMBDA { velocities[column] = all + place * kVelocityStride<P>; });
   }
   BRECCIA_HD void set_sums(const Tile& tile, Real* all) {
     for_each_column(
@@ -29,14 +29,18 @@ struct TileNodes {
   BRECCIA_HD void set_sums_apart(Real* apart) {
     for (int column = 0; column < kTileColumns; ++column) sums[column] = apart + column * kTileHeight * kChannels;
   }
-  /// Moves them to where set_sums would have put them; `box`: the nodes that may have got something.
+  /// Moves them to where set_sums would have put them; `box`: the nodes that got something.
   BRECCIA_HD void add_sums(const Tile& tile, const TileBox& box, Real* all) const {
-    for_each_column(tile, [&](int column, std::size_t place) BRECCIA_INLINE_LAMBDA {
-      for (int n = box.low[2] * kChannels; n < (box.high[2] + 1) * kChannels; ++n) {
-        all[place * kChannels + static_cast<std::size_t>(n)] += sums[column][n];
-        sums[column][n] = Real(0);
+    for (int x = box.low[0]; x <= box.high[0]; ++x) {
+      for (int y = box.low[1]; y <= box.high[1]; ++y) {
+        Real* const from = sums[column_index(x, y)];
+        Real* const to = all + place(tile, x, y) * kChannels;
+        for (int n = box.low[2] * kChannels; n < (box.high[2] + 1) * kChannels; ++n) {
+          to[n] += from[n];
+          from[n] = Real(0);
+        }
       }
-    });
+    }
   }
 
  private:

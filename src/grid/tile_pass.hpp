@@ -1,6 +1,8 @@
 // The pass over one tile: G2P and P2G on the nodes of the blocks around it.
 #pragma once
 
+#include <algorithm>
+
 #include "grid/pack_pass.hpp"
 #include "grid/tile_nodes.hpp"
 #include "grid/transfer.hpp"
@@ -16,17 +18,20 @@ class TileGrid {
  public:
   static constexpr bool kKeepsGradient = false;
 
-  BRECCIA_HD TileGrid(const PassArguments<P>& arguments, std::uint32_t tile)
+  /// `sums_apart`: as TileNodes::set_sums_apart wants them.
+  BRECCIA_HD TileGrid(const PassArguments<P>& arguments, std::uint32_t tile, Real* sums_apart)
       : a_(arguments), target_(arguments.targets[tile]), stencil_(arguments.tiles[tile].starts) {
     if (a_.gather) nodes_.set_velocities(a_.tiles[tile], a_.velocities, a_.places);
     if (a_.scatter && !a_.adds_by_tile) nodes_.set_sums(target_, a_.sums);
-    if (a_.scatter && a_.adds_by_tile) nodes_.set_sums_apart(sums_apart());
+    if (a_.scatter && a_.adds_by_tile) nodes_.set_sums_apart(sums_apart);
   }
 
   /// After the last pack of the tile.
   BRECCIA_HD void finish(TileReport& report) const {
     if (!a_.scatter) return;
-    const TileBox box = touched_.box(target_.starts);
+    TileBox box = touched_.box(target_.starts);
+    // Those that strayed have been moved to the lowest node.
+    if (strayed_) std::copy_n(target_.starts.low, 3, box.low);
     if (a_.adds_by_tile) nodes_.add_sums(target_, box, a_.sums);
     mark_rows(target_, box, a_.rows);
     if (strayed_) ++report.strayed;
@@ -50,11 +55,6 @@ class TileGrid {
   }
 
  private:
-  static Real* sums_apart() {
-    alignas(64) static thread_local Real sums[kTileColumns * kTileHeight * kChannels];
-    return sums;
-  }
-
   // Of each lane: value + gradient * (x_i - x_p).
   BRECCIA_HD SpreadMomentum<P> momentum_and_force(std::size_t i, const Kinematics<P>& k, const PackStress<P>& s) const {
     const T affine = a_.transfer.affine ? k.mass * T(a_.cell) : T(Real(0));
@@ -78,8 +78,9 @@ class TileGrid {
 };
 
 template <class P, class Fx>
-BRECCIA_HD void pass_over_tile(const PassArguments<P>& a, const Fx& fx, std::uint32_t index, TileReport& report) {
-  TileGrid<P> grid(a, index);
+BRECCIA_HD void pass_over_tile(const PassArguments<P>& a, const Fx& fx, typename P::Real* sums_apart,
+                               std::uint32_t index, TileReport& report) {
+  TileGrid<P> grid(a, index, sums_apart);
   PackPass<P, Fx, TileGrid<P>> packs(a, fx, grid);
   const Tile& tile = a.tiles[index];
   for (int done = 0; done < static_cast<int>(tile.particles); done += P::kLanes) {

@@ -28,7 +28,7 @@ std::vector<BlockKey> random_keys() {
 
 TEST(NodeColumns, GiveEachNodeItsOwnPlace) {
   const std::vector<BlockKey> keys = random_keys();
-  NodeColumns columns;
+  NodeColumns columns(32);
   columns.lay_out(keys);
   columns.append_run(5);
   columns.append_run(1);
@@ -45,7 +45,7 @@ TEST(NodeColumns, GiveEachNodeItsOwnPlace) {
 
 TEST(NodeColumns, GoOnFromBlockToBlock) {
   const std::vector<BlockKey> keys = random_keys();
-  NodeColumns columns;
+  NodeColumns columns(32);
   columns.lay_out(keys);
   std::size_t pairs = 0;
   for (std::size_t low = 0; low < keys.size(); ++low) {
@@ -64,19 +64,21 @@ TEST(NodeColumns, GoOnFromBlockToBlock) {
   EXPECT_GT(pairs, 100U);
 }
 
-// Loads would wait for stores whose addresses agree in their last twelve bits: sums of a node are 32 bytes, velocities
-// 16.
+// Loads would wait for stores whose addresses agree in their last twelve bits. Sums of a node are 32 bytes and
+// velocities twice 16 in mixed precision, both are 64 in double.
 TEST(NodeColumns, OfAStencilAreNever4096BytesApart) {
   for (int blocks = 1; blocks <= 300; ++blocks) {
-    NodeColumns columns;
-    columns.append_run(blocks);
-    const auto height = static_cast<int>(columns.blocks()[0].height);
-    for (int x = 0; x <= 2; ++x) {
-      for (int y = -2; y <= 2; ++y) {
-        const int apart = (kBlockWidth * x + y) * height;
-        if (apart == 0) continue;
-        EXPECT_NE(apart * 32 % 4096, 0) << blocks << " blocks";
-        EXPECT_NE(apart * 16 % 4096, 0) << blocks << " blocks";
+    for (const int bytes : {32, 64}) {
+      NodeColumns columns(static_cast<std::size_t>(bytes));
+      columns.append_run(blocks);
+      const auto height = static_cast<int>(columns.blocks()[0].height);
+      for (int x = 0; x <= 2; ++x) {
+        for (int y = -2; y <= 2; ++y) {
+          const int apart = (kBlockWidth * x + y) * height;
+          if (apart == 0) continue;
+          EXPECT_NE(apart * bytes % 4096, 0) << blocks << " blocks";
+          EXPECT_NE(apart * bytes / 2 % 4096, 0) << blocks << " blocks";
+        }
       }
     }
   }

@@ -153,7 +153,10 @@ uniform = [0, 0, "-10 m/s2"]
 }
 
 // A ball flies twice through the ends of a period of 1.2 m, whole and in a straight line; no position is ever outside.
-TEST(PeriodicPlanes, ContinueTheMotion) {
+class PeriodicAxis : public testing::TestWithParam<int> {};
+TEST_P(PeriodicAxis, ContinuesTheMotion) {
+  const auto along = [axis = GetParam()](const Vec3d& v) { return axis == 0 ? v.x : axis == 1 ? v.y : v.z; };
+  const auto vector = [](const char* value) { return from_axis(GetParam(), {value, "0", "0"}); };
   constexpr double kPeriod = 1.2;
   const Scene scene = load(R"([scene]
 end = "10 s"
@@ -162,18 +165,14 @@ cell = "0.1 m"
 [[body]]
 shape = "sphere"
 radius = "0.3 m"
-velocity = ["300 m/s", 0, 0]
-[effects]
+velocity = )" + vector(R"("300 m/s")") +
+                           R"([effects]
 gravity = "off"
 [[boundary]]
-point = ["-0.6 m", 0, 0]
-normal = [1, 0, 0]
 kind = "periodic"
-[[boundary]]
-point = ["0.6 m", 0, 0]
-normal = [-1, 0, 0]
-kind = "periodic"
-)");
+point = )" + vector(R"("-0.6 m")") +
+                           "normal = " + vector("1") + "[[boundary]]\nkind = \"periodic\"\npoint = " +
+                           vector(R"("0.6 m")") + "normal = " + vector("-1"));
   std::vector<Vec3d> start;
   simulate(scene, [&](const TimeLoop& loop) {
     const ParticleOutput p = loop.engine().observe();
@@ -182,14 +181,16 @@ kind = "periodic"
       for (std::size_t i = 0; i < p.size(); ++i) start[p.id[i]] = p.position[i];
     }
     for (std::size_t i = 0; i < p.size(); ++i) {
-      EXPECT_GE(p.position[i].x, -0.5 * kPeriod);
-      EXPECT_LT(p.position[i].x, 0.5 * kPeriod);
-      const double path = p.position[i].x - start[p.id[i]].x - 300.0 * loop.time();
+      EXPECT_GE(along(p.position[i]), -0.5 * kPeriod);
+      EXPECT_LT(along(p.position[i]), 0.5 * kPeriod);
+      const double path = along(p.position[i]) - along(start[p.id[i]]) - 300.0 * loop.time();
       EXPECT_NEAR(path - kPeriod * std::round(path / kPeriod), 0.0, 1e-5);
     }
     return loop.time() < 8e-3 && !testing::Test::HasFailure();
   });
 }
+
+INSTANTIATE_TEST_SUITE_P(Axes, PeriodicAxis, testing::Values(0, 1, 2));
 
 struct Sums {
   double along = 0.0, energy = 0.0, pressure = 0.0;
