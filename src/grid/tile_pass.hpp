@@ -1,8 +1,6 @@
 // The pass over one tile: G2P and P2G on the nodes of the blocks around it.
 #pragma once
 
-#include <algorithm>
-
 #include "grid/pack_pass.hpp"
 #include "grid/tile_nodes.hpp"
 #include "grid/transfer.hpp"
@@ -31,7 +29,7 @@ class TileGrid {
     if (!a_.scatter) return;
     TileBox box = touched_.box(target_.starts);
     // Those that strayed have been moved to the lowest node.
-    if (strayed_) std::copy_n(target_.starts.low, 3, box.low);
+    for (int axis = 0; strayed_ && axis < 3; ++axis) box.low[axis] = target_.starts.low[axis];
     if (a_.adds_by_tile) nodes_.add_sums(target_, box, a_.sums);
     mark_rows(target_, box, a_.rows);
     if (strayed_) ++report.strayed;
