@@ -226,7 +226,7 @@ class HostEngine final : public Engine {
   std::vector<BlockSums> block_sums_;        // by owned block
   std::vector<std::int32_t> boundary_node_;  // packed, of the particles of boundary tiles at the last sorting
   std::vector<char> is_boundary_;            // by tile: it reaches shared blocks or those of other ranks
-  double trailing_kick_ = 0.0;               // of which the next update of the grid must be; 0: any
+  double trailing_kick_ = 0.0;               // that the next grid update must have; 0: any
   std::size_t owned_blocks_ = 0;
   double smallest_mass_ = 0.0;
   std::uint64_t strayed_packs_ = 0;  // seen since the last sorting; reported there, on all ranks at once
