@@ -50,10 +50,15 @@ Load count_load(const EngineState& state, std::uint64_t flaws, const grid::Perio
     const std::int32_t plane = grid::component(there, planes.axis);
     return planes.low <= plane && plane < planes.high;
   };
+  occupancy.count_cubes();
+  const auto is_alone = [&](std::uint32_t b) {
+    const BlockCoord own = grid::block_coord(occupancy.blocks()[b].block);
+    return occupancy.is_alone(b, periodicity) && grid::known_around(own, planes.axis, periodicity, is_known);
+  };
   Load load{.particles = state.particles, .flaws = flaws};
   grid::BlockTable blocks;
   for (std::uint32_t b = 0; b < occupied; ++b) {
-    if (lone_without_grid && occupancy.is_alone(b, periodicity, is_known)) continue;
+    if (lone_without_grid && is_alone(b)) continue;
     ++load.tiles;
     reach(grid::block_coord(occupancy.blocks()[b].block), sides[b], periodicity, blocks);
   }

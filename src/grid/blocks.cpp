@@ -1,5 +1,8 @@
 #include "grid/blocks.hpp"
 
+#include <algorithm>
+#include <bit>
+
 namespace breccia::grid {
 
 void BlockTable::clear() {
@@ -9,27 +12,33 @@ void BlockTable::clear() {
 
 std::size_t BlockTable::slot(BlockKey key) const {
   const std::size_t mask = slots_.size() - 1;
-  // Fibonacci hashing: neighbouring keys differ in their low bits only.
-  std::size_t at = (key * 0x9E3779B97F4A7C15ULL >> 24) & mask;
+  std::size_t at = key_hash(key, static_cast<unsigned>(std::bit_width(mask)));
   while (slots_[at] != 0 && keys_[slots_[at] - 1] != key) at = (at + 1) & mask;
   return at;
 }
 
-void BlockTable::grow() {
-  slots_.assign(slots_.empty() ? 1024 : slots_.size() * 2, 0U);
+void BlockTable::reserve(std::size_t blocks) {
+  // At most half of the slots are taken.
+  const std::size_t slots = std::bit_ceil(2 * blocks);
+  if (slots > slots_.size()) grow(slots);
+}
+
+void BlockTable::grow(std::size_t slots) {
+  slots_.assign(slots, 0U);
   for (std::size_t i = 0; i < keys_.size(); ++i) slots_[slot(keys_[i])] = static_cast<std::uint32_t>(i + 1);
 }
 
 std::uint32_t BlockTable::insert(BlockKey key) {
-  if (last_ < keys_.size() && keys_[last_] == key) return last_;
-  if (2 * (keys_.size() + 1) > slots_.size()) grow();
+  std::uint32_t& last = last_[key % last_.size()];
+  if (last < keys_.size() && keys_[last] == key) return last;
+  if (2 * (keys_.size() + 1) > slots_.size()) grow(std::max<std::size_t>(1024, 2 * slots_.size()));
   const std::size_t at = slot(key);
   if (slots_[at] == 0) {
     keys_.push_back(key);
     slots_[at] = static_cast<std::uint32_t>(keys_.size());
   }
-  last_ = slots_[at] - 1;
-  return last_;
+  last = slots_[at] - 1;
+  return last;
 }
 
 std::uint32_t BlockTable::find(BlockKey key) const {

@@ -4,10 +4,12 @@
 
 #include "grid/blocks.hpp"
 #include "grid/boundary.hpp"
+#include "grid/cell_counts.hpp"
 #include "grid/engine.hpp"
 #include "grid/occupancy.hpp"
 #include "grid/ordered_sums.hpp"
 #include "grid/period_images.hpp"
+#include "grid/sweep_board.hpp"
 #include "grid/sweep_plan.hpp"
 #include "grid/tile.hpp"
 #include "mpi/halo.hpp"
@@ -16,10 +18,10 @@
 
 namespace breccia::grid {
 
-/// Which cells along each axis hold particles of a tile: bit n for cell n of its stack.
-struct OccupiedCells {
-  std::uint16_t axis[3] = {0, 0, 0};
-  static_assert(kStackHeight <= 16);
+/// What a thread finds of the particles it settles.
+struct SettledShare {
+  Occupancy occupancy;
+  std::vector<std::vector<std::byte>> leaving;  ///< records, by rank
 };
 
 /// Nodes of a block that a rank asks their owner for: bit n for the plane n across the slabs.
@@ -74,8 +76,8 @@ class HostEngine final : public Engine {
   NodeArguments<P> node_arguments(double kick);
   void run_pass(const PassArguments<P>& arguments, const NodeArguments<P>* trailing = nullptr);
   void report_fault();
-  void run_task(const SweepTask& task, const PassArguments<P>& arguments, const NodeArguments<P>* trailing,
-                std::vector<TileReport>& reports);
+  void run_work(SweepWork work, const SweepPlane& plane, const PassArguments<P>& arguments,
+                const NodeArguments<P>* trailing, std::vector<TileReport>& reports);
   void update_stack(const Tile& tile, const NodeArguments<P>& arguments);
 
   // Memory (host_engine_memory.cpp).
@@ -113,10 +115,12 @@ class HostEngine final : public Engine {
     if (timeline_ != nullptr) timeline_->add(name, lane, begin, end);
   }
 
-  // Sorting and migration (host_engine_sort.cpp, _migrate.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
+  // Sorting and migration (host_engine_sort.cpp, _arrange, _migrate.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
   void settle(std::span<const Placement> placements);
   template <class F>
-  void settle_each(F&& for_each_placement);  // visits them: memory for all of them is not needed
+  void settle_shares(std::span<const std::uint32_t> bounds, F&& for_each_placement);
+  Occupancy join_shares(std::span<SettledShare> shares, std::span<const std::uint32_t> bounds);
+  [[nodiscard]] std::vector<std::uint32_t> share_packs() const;
   void choose_slabs(std::span<const Placement> placements);
   [[nodiscard]] Placement place(std::size_t slot, BlockCoord stack) const;  // of a particle that has moved
   [[nodiscard]] double work_of_periods() const;  // of the uniform field, before particles are put back
@@ -131,21 +135,34 @@ class HostEngine final : public Engine {
   [[nodiscard]] bool boundary_strayed() const;
   [[nodiscard]] bool has_drifted(std::size_t slot, std::int32_t sorted_node) const;
   [[nodiscard]] bool lone_strayed() const;  // more than a node since the last sorting
+  // Calls visit(slot, cell) for the particles of packs first .. last - 1 that have been sent to a cell, in the order of
+  // their slots.
   template <class F>
-  void for_each_destination(F&& visit) const;
+  void for_each_destination(std::size_t first, std::size_t last, F&& visit) const {
+    for (std::size_t p = first; p < last; ++p) {
+      const Kinematics<P>& k = store_.kinematics[p];
+      for (std::size_t l = 0; l < kLanes; ++l) {
+        const int lane = static_cast<int>(l);
+        if (k.mass[lane] > Real(0)) visit(p * kLanes + l, BlockCell::of(k.node[lane]));
+      }
+    }
+  }
   void arrange(Occupancy& occupancy);
-  void lay_out_tiles(std::span<std::uint32_t> place, std::uint32_t alone);
+  [[nodiscard]] std::vector<std::uint32_t> order_particles(const Occupancy& occupancy,
+                                                           std::span<const std::uint32_t> tile_of_block);
+  void lay_out_tiles(CellCounts& counts);
   [[nodiscard]] std::vector<std::uint32_t> find_tiles(const Occupancy& occupancy, std::span<const char> lone);
   void connect_tiles();
+  [[nodiscard]] std::vector<SweepTile> sweep_tiles() const;
   void insert_stacks();
   [[nodiscard]] std::vector<std::vector<BlockRequest>> reach_blocks();
   void connect_halo();
   [[nodiscard]] std::vector<mpi::SharedNodes> nodes_of(const std::vector<std::vector<BlockRequest>>& requests) const;
   [[nodiscard]] std::vector<mpi::SharedNodes> velocity_halves_of(const std::vector<mpi::SharedNodes>& peers) const;
   [[nodiscard]] BlockCoord stored(BlockCoord block) const;  // as whose nodes those of a tile's block lie in memory
-  void insert_owned(BlockCoord stored_block);
+  std::uint32_t insert_owned(BlockCoord stored_block);  // its index
   void share_with_images();
-  void sort_cells_by_id(std::span<std::uint32_t> source, std::span<const std::uint32_t> cell_ends) const;
+  void sort_cells_by_id(std::span<std::uint32_t> source, CellCounts& ends) const;
   void compact_flaws();
   void switch_damage_off();
 
@@ -171,11 +188,23 @@ class HostEngine final : public Engine {
   // Calls visit(slot, stack) for every particle, in storage order; its node is relative to that block.
   template <class F>
   void for_each_particle(F&& visit) const {
-    for (std::size_t t = 0; t < tiles_.size(); ++t) {
-      const BlockCoord stack = block_coord(stacks_[t]);
-      for (std::uint32_t n = 0; n < tiles_[t].particles; ++n) visit(tiles_[t].first_pack * kLanes + n, stack);
+    for_each_particle_of(0, static_cast<std::uint32_t>(store_.packs()), visit);
+  }
+  // The same of the tiles that begin, and the particles without grid that lie, in the packs first .. last - 1.
+  template <class F>
+  void for_each_particle_of(std::uint32_t first, std::uint32_t last, F&& visit) const {
+    auto tile = std::ranges::lower_bound(tiles_, first, {}, &Tile::first_pack);
+    for (; tile != tiles_.end() && tile->first_pack < last; ++tile) {
+      const BlockCoord stack = block_coord(stacks_[static_cast<std::size_t>(tile - tiles_.begin())]);
+      for (std::uint32_t n = 0; n < tile->particles; ++n) visit(tile->first_pack * kLanes + n, stack);
     }
-    for (std::uint32_t n = 0; n < lone_.particles; ++n) visit(lone_.first_pack * kLanes + n, lone_stack_[n]);
+    const auto lone_before = [&](std::uint32_t pack) {
+      const std::size_t lanes = kLanes * (std::max(pack, lone_.first_pack) - lone_.first_pack);
+      return std::min(lanes, std::size_t{lone_.particles});
+    };
+    for (std::size_t n = lone_before(first); n < lone_before(last); ++n) {
+      visit(lone_.first_pack * kLanes + n, lone_stack_[n]);
+    }
   }
   // Of an observation: what the grid says of each slot; empty vectors without a grid.
   struct GridView {

@@ -114,11 +114,12 @@ std::vector<std::vector<BlockRequest>> HostEngine<P>::reach_blocks() {
   std::vector<std::vector<BlockRequest>> of_rank(static_cast<std::size_t>(comm_.size()));
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     bool all_mine = true;
+    std::fill(std::begin(tiles_[t].neighbours), std::end(tiles_[t].neighbours), kNoBlock);
     std::array<std::uint32_t, kNeighbours> planes{};
     for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord there) {
       const BlockCoord b = stored(there);
       const std::uint32_t mine = own_planes(b);
-      if (mine != 0) insert_owned(b);
+      if (mine != 0) tiles_[t].neighbours[n] = insert_owned(b);
       all_mine = all_mine && mine == kAllPlanes;
       planes[static_cast<std::size_t>(n)] = planes_in_reach(neighbour_offset(n), axis);
     });
@@ -147,9 +148,11 @@ BlockCoord HostEngine<P>::stored(BlockCoord block) const {
 }
 
 template <class P>
-void HostEngine<P>::insert_owned(BlockCoord stored_block) {
-  blocks_.insert(block_key(stored_block));
-  blocks_.insert(block_key(periodicity_.wrap(stored_block)));
+std::uint32_t HostEngine<P>::insert_owned(BlockCoord stored_block) {
+  const std::uint32_t block = blocks_.insert(block_key(stored_block));
+  const BlockCoord original = periodicity_.wrap(stored_block);
+  if (original != stored_block) blocks_.insert(block_key(original));
+  return block;
 }
 
 template <class P>
@@ -181,9 +184,9 @@ void HostEngine<P>::connect_tiles() {
     for (const BlockRequest& request : requests) blocks_.insert(request.key);
   }
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
-    std::fill(std::begin(tiles_[t].neighbours), std::end(tiles_[t].neighbours), kNoBlock);
-    for_each_reached(occupied_cells_[t], stacks_[t],
-                     [&](int n, BlockCoord b) { tiles_[t].neighbours[n] = blocks_.insert(block_key(stored(b))); });
+    for_each_reached(occupied_cells_[t], stacks_[t], [&](int n, BlockCoord b) {
+      if (tiles_[t].neighbours[n] == kNoBlock) tiles_[t].neighbours[n] = blocks_.insert(block_key(stored(b)));
+    });
   }
   columns_.lay_out(blocks_.keys());
   node_places_ = columns_.places();
@@ -194,7 +197,7 @@ void HostEngine<P>::connect_tiles() {
   connect_halo();
   rows_.assign(columns_.blocks().size(), RowMask{});
   if (!has_few_nodes()) hold_velocities();
-  sweep_ = plan_sweep(stacks_, is_boundary_, periodicity_.blocks[0], setup_.threads);
+  sweep_ = plan_sweep(sweep_tiles(), periodicity_.blocks[0], setup_.threads);
   const auto is_shared = [&](std::uint32_t b) { return block_sums_[b] == BlockSums::kShared; };
   images_.find(blocks_, owned_blocks_, periodicity_, [&](const auto& image) { return is_shared(image.block); });
   boundaries_.find_nodes(

@@ -13,10 +13,16 @@ std::vector<char> HostEngine<P>::find_lone(Occupancy& occupancy) const {
   // What other ranks hold is not known here, unless they tell.
   const bool others_tell = setup_.numerics.reproducible && comm_.size() > 1;
   if (others_tell) tell_neighbours(occupancy);
+  occupancy.count_cubes();
+  const auto is_known = [&](BlockCoord block) {
+    return others_tell || comm_.size() == 1 || known_around(block, slabs_.axis(), periodicity_, [&](BlockCoord there) {
+             return own_planes(there) == kAllPlanes;
+           });
+  };
   std::vector<char> lone(own);
+#pragma omp parallel for schedule(static) num_threads(setup_.threads)
   for (std::uint32_t b = 0; b < own; ++b) {
-    lone[b] = occupancy.is_alone(b, periodicity_,
-                                 [&](BlockCoord there) { return others_tell || own_planes(there) == kAllPlanes; });
+    lone[b] = occupancy.is_alone(b, periodicity_) && is_known(block_coord(occupancy.blocks()[b].block)) ? 1 : 0;
   }
   return lone;
 }

@@ -84,6 +84,16 @@ mpi::PlaneWork HostEngine<P>::work(std::span<const double> more) const {
 }
 
 template <class P>
+std::vector<SweepTile> HostEngine<P>::sweep_tiles() const {
+  std::vector<SweepTile> tiles;
+  for (std::size_t t = 0; t < tiles_.size(); ++t) {
+    const double cost = kWeights<P>.tile + kWeights<P>.pack * packs_for(tiles_[t].particles);
+    tiles.push_back({stacks_[t], is_boundary_[t] != 0, cost});
+  }
+  return tiles;
+}
+
+template <class P>
 std::int32_t HostEngine<P>::planes_kept_together(int axis) const {
   // Ordered sums are those of whole tiles.
   if (setup_.numerics.reproducible) return axis == 2 ? kStackHeight : kBlockWidth;

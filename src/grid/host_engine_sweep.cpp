@@ -1,6 +1,10 @@
 // The pass over all particles of this rank: boundary tiles first, so that their sums travel to other ranks while the
 // interior is computed (docs/overlap.md).
+#include <omp.h>
+
 #include <algorithm>
+#include <atomic>
+#include <thread>
 
 #include "grid/host_engine.hpp"
 #include "grid/sweep_board.hpp"
@@ -8,20 +12,18 @@
 namespace breccia::grid {
 
 template <class P>
-void HostEngine<P>::run_task(const SweepTask& task, const PassArguments<P>& arguments, const NodeArguments<P>* trailing,
-                             std::vector<TileReport>& reports) {
+void HostEngine<P>::run_work(SweepWork work, const SweepPlane& plane, const PassArguments<P>& arguments,
+                             const NodeArguments<P>* trailing, std::vector<TileReport>& reports) {
   // Tiles between two looks at the messages: some ten microseconds.
   constexpr std::uint32_t kStretch = 8;
-  for (const SweepStep& step : task.steps) {
-    for (std::uint32_t n = step.first; n < step.last; ++n) {
-      if (!step.update) {
-        const std::uint32_t tile = sweep_.order[n];
-        kernels_.pass(arguments, tile, reports[tile]);
-        if (n % kStretch == 0) progress(trailing);
-      } else if (trailing != nullptr) {
-        update_stack(tiles_[n], *trailing);
-      }
-    }
+  if (work.kind == SweepWork::Kind::kUpdate) {
+    for (std::uint32_t t = plane.first_tile; t < plane.last_tile; ++t) update_stack(tiles_[t], *trailing);
+    return;
+  }
+  for (std::uint32_t n = plane.first; n < plane.last; ++n) {
+    const std::uint32_t tile = sweep_.order[n];
+    kernels_.pass(arguments, tile, reports[tile]);
+    if (n % kStretch == 0) progress(trailing);
   }
 }
 
@@ -40,36 +42,45 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
   fault_ = {};
   std::vector<TileReport> reports(tiles_.size());
   std::vector<TileReport> lone_reports((lone_packs + kChunk - 1) / kChunk);
+  std::atomic<std::size_t> next_lone{0};
+  // Particles without grid wait for nobody: they fill the time in which a thread finds nothing else.
+  const auto run_lone = [&] {
+    const std::size_t n = next_lone++;
+    if (n >= lone_reports.size()) return false;
+    const auto first = static_cast<std::uint32_t>(n) * kChunk;
+    kernels_.lone_pass(arguments, first, std::min(first + kChunk, lone_packs), lone_reports[n]);
+    return true;
+  };
+  const auto run_part = [&](const SweepPart& part, SweepBoard& board) {
+    for (;;) {
+      if (const auto work = board.take(omp_get_thread_num())) {
+        run_work(*work, part.planes[work->plane], arguments, trailing, reports);
+        board.finish(*work);
+        run_lone();
+      } else if (board.all_taken()) {
+        return;
+      } else if (!run_lone()) {
+        progress(trailing);
+        std::this_thread::yield();
+      }
+    }
+  };
   const auto begin = Timeline::Clock::now();
   auto boundary_done = begin;
   const bool early = arguments.scatter && setup_.numerics.overlap;
-  SweepBoard board(sweep_.interior);
+  SweepBoard boundary(sweep_.boundary, false);
+  SweepBoard interior(sweep_.interior, trailing != nullptr);
 #pragma omp parallel num_threads(setup_.threads)
   {
-    for (const SweepPhase& phase : sweep_.boundary) {
-#pragma omp for schedule(dynamic, 1)
-      for (const SweepTask& task : phase) run_task(task, arguments, trailing, reports);
-    }
+    run_part(sweep_.boundary, boundary);
+#pragma omp barrier
 #pragma omp master
     {
       boundary_done = Timeline::Clock::now();
       if (early) send_sums();
     }
-#pragma omp for schedule(dynamic, 1) nowait
-    for (std::size_t n = 0; n < lone_reports.size(); ++n) {
-      const auto first = static_cast<std::uint32_t>(n) * kChunk;
-      kernels_.lone_pass(arguments, first, std::min(first + kChunk, lone_packs), lone_reports[n]);
-    }
-    // A thread leaves a phase only when all its tasks have been taken: what it waits for later is being done by others,
-    // who wait for nothing behind it.
-    for (std::size_t p = 0; p < sweep_.interior.size(); ++p) {
-      const SweepPhase& phase = sweep_.interior[p];
-#pragma omp for schedule(dynamic, 1) nowait
-      for (std::size_t n = 0; n < phase.size(); ++n) {
-        board.wait_for_turn(p, phase[n]);
-        run_task(phase[n], arguments, trailing, reports);
-        board.finish(p, n);
-      }
+    run_part(sweep_.interior, interior);
+    while (run_lone()) {
     }
   }
   note("boundary tiles", Timeline::Lane::kTiles, begin, boundary_done);

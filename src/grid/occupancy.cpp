@@ -5,22 +5,96 @@
 #include "breccia/error.hpp"
 
 namespace breccia::grid {
+namespace {
+
+// For one more block: its number must leave six bits of a word to the cell.
+void require_room(std::size_t blocks) {
+  constexpr std::size_t kMostBlocks = std::size_t{1} << 26;
+  if (blocks == kMostBlocks) throw NumericsError("particles in more than 67 million blocks of a rank: use more ranks");
+}
+
+}  // namespace
 
 BlockCell Occupancy::add(const std::int32_t (&node)[3]) {
-  constexpr std::size_t kMostBlocks = std::size_t{1} << 26;
   const BlockKey key = block_key({node[0] >> 2, node[1] >> 2, node[2] >> 2});
   const std::uint32_t b = table_.insert(key);
   if (b == blocks_.size()) {
-    if (b == kMostBlocks) throw NumericsError("particles in more than 67 million blocks of a rank: use more ranks");
+    require_room(b);
     blocks_.push_back({key, 0, {node[0], node[1], node[2]}});
   }
   ++blocks_[b].count;
   return {b, node[0] & 3, node[1] & 3, node[2] & 3};
 }
 
+std::vector<std::uint32_t> Occupancy::merge(const Occupancy& other) {
+  std::vector<std::uint32_t> place;
+  place.reserve(other.blocks_.size());
+  for (const Occupant& o : other.blocks_) {
+    const std::uint32_t b = table_.insert(o.block);
+    if (b == blocks_.size()) {
+      require_room(b);
+      blocks_.push_back(o);
+    } else {
+      blocks_[b].count += o.count;
+    }
+    place.push_back(b);
+  }
+  return place;
+}
+
 void Occupancy::tell(const Occupant& occupant) {
   table_.insert(occupant.block);
   blocks_.push_back(occupant);
+}
+
+void Occupancy::count_cubes() {
+  cubes_.clear();
+  cubes_.reserve(blocks_.size());
+  in_cube_.clear();
+  for (const Occupant& o : blocks_) {
+    const BlockCoord b = block_coord(o.block);
+    const std::uint32_t cube = cubes_.insert(block_key({b.x >> 2, b.y >> 2, b.z >> 2}));
+    if (cube == in_cube_.size()) in_cube_.push_back(0);
+    ++in_cube_[cube];
+  }
+}
+
+bool Occupancy::cubes_are_empty(BlockCoord block, const Periodicity& periodicity) const {
+  // Along each axis the cubes of the block and of those beside it, the same ones once. Where a period makes the two
+  // outer ones the same that cube counts twice: then the blocks themselves are looked at.
+  std::int32_t along[3][3];
+  int count[3];
+  for (int axis = 0; axis < 3; ++axis) {
+    count[axis] = 0;
+    for (const std::int32_t side : {-1, 0, 1}) {
+      const std::int32_t cube = periodicity.wrap(component(block, axis) + side, axis) >> 2;
+      if (count[axis] == 0 || along[axis][count[axis] - 1] != cube) along[axis][count[axis]++] = cube;
+    }
+  }
+  std::uint32_t occupied = 0;
+  for (int i = 0; i < count[0]; ++i) {
+    for (int j = 0; j < count[1]; ++j) {
+      for (int k = 0; k < count[2]; ++k) {
+        const std::uint32_t cube = cubes_.find(block_key({along[0][i], along[1][j], along[2][k]}));
+        if (cube != kNoBlock) occupied += in_cube_[cube];
+        if (occupied > 1) return false;
+      }
+    }
+  }
+  return true;
+}
+
+bool Occupancy::is_alone(std::uint32_t b, const Periodicity& periodicity) const {
+  if (blocks_[b].count != 1) return false;
+  const BlockCoord own = block_coord(blocks_[b].block);
+  if (cubes_are_empty(own, periodicity)) return true;
+  for (int n = 0; n < 27; ++n) {
+    if (n == 13) continue;
+    const BlockCoord offset{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
+    const BlockCoord there = periodicity.wrap({own.x + offset.x, own.y + offset.y, own.z + offset.z});
+    if (is_near(blocks_[b], offset, there)) return false;
+  }
+  return true;
 }
 
 bool Occupancy::is_near(const Occupant& lone, BlockCoord offset, BlockCoord there) const {

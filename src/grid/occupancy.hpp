@@ -37,35 +37,44 @@ struct BlockCell {
   }
 };
 
+/// Whether is_known(block) holds for the blocks at and beside `block` along `axis`, which speak for their planes.
+template <class F>
+bool known_around(BlockCoord block, int axis, const Periodicity& periodicity, F&& is_known) {
+  for (const std::int32_t side : {-1, 0, 1}) {
+    BlockCoord there = block;
+    (axis == 0 ? there.x : axis == 1 ? there.y : there.z) += side;
+    if (!is_known(periodicity.wrap(there))) return false;
+  }
+  return true;
+}
+
 /// The blocks that hold particles, in the order in which they were met.
 class Occupancy {
  public:
+  /// Makes room for so many blocks.
+  void reserve(std::size_t blocks) { table_.reserve(blocks); }
   /// Counts a particle. Throws NumericsError beyond 67 million blocks.
   BlockCell add(const std::int32_t (&node)[3]);
   /// The blocks of these particles; behind them those that other ranks told of.
   [[nodiscard]] const std::vector<Occupant>& blocks() const { return blocks_; }
   /// A block of another rank.
   void tell(const Occupant& occupant);
+  /// Adds what `other` has counted; returns the places of its blocks here.
+  std::vector<std::uint32_t> merge(const Occupancy& other);
+  /// To be called before is_alone, when all blocks are known.
+  void count_cubes();
   /// Whether the one particle of block `b` shares no node with another one, even after both have drifted one node.
-  /// Blocks next to it that this rank knows nothing of make `is_known(block)` false: then it counts as not alone.
-  template <class F>
-  [[nodiscard]] bool is_alone(std::uint32_t b, const Periodicity& periodicity, F&& is_known) const {
-    if (blocks_[b].count != 1) return false;
-    const BlockCoord own = block_coord(blocks_[b].block);
-    for (int n = 0; n < 27; ++n) {
-      const BlockCoord offset{n / 9 - 1, n / 3 % 3 - 1, n % 3 - 1};
-      const BlockCoord there = periodicity.wrap({own.x + offset.x, own.y + offset.y, own.z + offset.z});
-      if (!is_known(there)) return false;
-      if (n != 13 && is_near(blocks_[b], offset, there)) return false;
-    }
-    return true;
-  }
+  [[nodiscard]] bool is_alone(std::uint32_t b, const Periodicity& periodicity) const;
 
  private:
   [[nodiscard]] bool is_near(const Occupant& lone, BlockCoord offset, BlockCoord there) const;
+  // Whether nothing else lies in the cubes that the block and those around it belong to: that settles nearly all cases.
+  [[nodiscard]] bool cubes_are_empty(BlockCoord block, const Periodicity& periodicity) const;
 
   BlockTable table_;
   std::vector<Occupant> blocks_;
+  BlockTable cubes_;                    // of 4 x 4 x 4 blocks
+  std::vector<std::uint32_t> in_cube_;  // occupied blocks
 };
 
 }  // namespace breccia::grid

@@ -70,16 +70,18 @@ struct Displacement {
 };
 
 template <class P>
-Displacement displacement_of(std::span<const std::uint32_t> source) {
-  Displacement d;
+Displacement displacement_of(std::span<const std::uint32_t> source, int threads) {
+  std::size_t back = 0;
+  std::size_t ahead = 0;
+#pragma omp parallel for schedule(static) num_threads(threads) reduction(max : back, ahead)
   for (std::size_t s = 0; s < source.size(); ++s) {
     if (source[s] == ParticleStore<P>::kEmpty) continue;
     const std::size_t to = s / P::kLanes;
     const std::size_t from = source[s] / P::kLanes;
-    if (from < to) d.back = std::max(d.back, to - from);
-    if (from > to) d.ahead = std::max(d.ahead, from - to);
+    if (from < to) back = std::max(back, to - from);
+    if (from > to) ahead = std::max(ahead, from - to);
   }
-  return d;
+  return {back, ahead};
 }
 
 // A stretch of packs that is rearranged in place, front to back: what is overwritten before it is needed waits in a
@@ -312,7 +314,7 @@ std::size_t ParticleStore<P>::bytes_per_particle(const GroupSet& groups) {
 
 template <class P>
 std::size_t ParticleStore<P>::gather(std::span<const std::uint32_t> source, int threads) {
-  const Displacement d = displacement_of<P>(source);
+  const Displacement d = displacement_of<P>(source, threads);
   std::size_t beside = 0;
   for_each_group(
       [&](Group group, auto& array) { beside = std::max(beside, rearrange<P>(array, source, group, d, threads)); });

@@ -1,33 +1,50 @@
-// Which tasks of a sweep are done. Threads wait for single tasks by it instead of for all of a phase.
+// Who does what next in a sweep, while threads are at it. A plane is passed over once those next to it of a lower turn
+// are, and its grid is updated once nobody will read its old velocities or add to it any more: as soon as it and both
+// neighbours are passed over, while its nodes are still in the cache.
 #pragma once
 
-#include <atomic>
-#include <cstddef>
-#include <thread>
+#include <cstdint>
+#include <mutex>
+#include <optional>
 #include <vector>
 
 #include "grid/sweep_plan.hpp"
 
 namespace breccia::grid {
 
+struct SweepWork {
+  enum class Kind : std::uint8_t { kPass, kUpdate };
+  Kind kind;
+  std::uint32_t plane;
+};
+
 class SweepBoard {
  public:
-  explicit SweepBoard(const std::vector<SweepPhase>& phases) {
-    done_.reserve(phases.size());
-    for (const SweepPhase& phase : phases) done_.emplace_back(phase.size());
-  }
+  /// Of `part`, which must stay as it is; `updates`: whether the grid update trails the passes.
+  SweepBoard(const SweepPart& part, bool updates);
 
-  /// Returns once those tasks of the phase before are done that `task` comes after. Some thread must have taken each of
-  /// them before.
-  void wait_for_turn(std::size_t phase, const SweepTask& task) const {
-    for (std::size_t n = task.after_first; n < task.after_last; ++n) {
-      while (!done_[phase - 1][n].load(std::memory_order_acquire)) std::this_thread::yield();
-    }
-  }
-  void finish(std::size_t phase, std::size_t task) { done_[phase][task].store(true, std::memory_order_release); }
+  /// What the thread of this home does next: of its own planes the lowest that is ready, else one that another has left
+  /// till last. Nothing if all is waiting for what other threads do, or all_taken().
+  [[nodiscard]] std::optional<SweepWork> take(int home);
+  /// To be called after the work is done that was taken.
+  void finish(SweepWork work);
+  /// Nothing is left for anybody to take.
+  [[nodiscard]] bool all_taken();
 
  private:
-  std::vector<std::vector<std::atomic<bool>>> done_;
+  enum class State : std::uint8_t { kOpen, kTaken, kDone };
+
+  [[nodiscard]] bool passed(std::uint32_t plane) const { return plane == kNoPlane || pass_[plane] == State::kDone; }
+  [[nodiscard]] bool pass_ready(std::uint32_t plane) const;
+  [[nodiscard]] bool update_ready(std::uint32_t plane) const;
+  [[nodiscard]] std::optional<SweepWork> ready(std::uint32_t plane) const;
+
+  std::mutex mutex_;
+  const SweepPart& part_;
+  std::vector<State> pass_;
+  std::vector<State> update_;
+  std::vector<std::uint32_t> lowest_;  // of each home, the first plane that may have something open
+  std::size_t open_;
 };
 
 }  // namespace breccia::grid

@@ -1,4 +1,5 @@
-// In which order the tiles of a rank are passed over, by which thread, and when the grid update trails behind.
+// What a pass over the tiles of a rank consists of: planes of blocks, which of them wait for which, and the thread at
+// which each is at home. What runs when is decided while it runs (sweep_board.hpp).
 #pragma once
 
 #include <cstddef>
@@ -10,25 +11,29 @@
 
 namespace breccia::grid {
 
-/// A step of a sweep: pass over the tiles order[first] .. order[last - 1], or update the grid in the blocks of the
-/// tiles first .. last-1.
-struct SweepStep {
-  std::uint32_t first, last;
-  bool update;
+inline constexpr std::uint32_t kNoPlane = 0xffffffffU;
+
+/// The tiles of one plane of blocks across x.
+struct SweepPlane {
+  std::uint32_t first_tile = 0, last_tile = 0;  ///< all of them
+  std::uint32_t first = 0, last = 0;            ///< in Sweep::order: those that the part passes over
+  std::uint32_t left = kNoPlane;                ///< planes next to it, of the same part
+  std::uint32_t right = kNoPlane;
+  int turn = 0;  ///< planes next to each other differ; where two add to the same node, that of the lower turn is first
 };
-/// Steps that one thread does in this order, once the tasks after_first .. after_last-1 of the phase before are done.
-struct SweepTask {
-  std::vector<SweepStep> steps;
-  std::size_t after_first = 0;
-  std::size_t after_last = 0;
+
+/// Planes in ascending order.
+struct SweepPart {
+  std::vector<SweepPlane> planes;
+  /// Thread t is at home in the planes homes[t] .. homes[t + 1] - 1, of about the same cost for each: what it worked on
+  /// in the last pass lies in its caches.
+  std::vector<std::uint32_t> homes;
 };
-/// Tasks that may run at once.
-using SweepPhase = std::vector<SweepTask>;
 
 struct Sweep {
   std::vector<std::uint32_t> order;  ///< tiles, those of the boundary first
-  std::vector<SweepPhase> boundary;  ///< tiles that reach nodes shared with other ranks
-  std::vector<SweepPhase> interior;
+  SweepPart boundary;                ///< tiles that reach nodes shared with other ranks
+  SweepPart interior;                ///< all others; runs once the boundary is done
 };
 
 /// Turn of a plane of blocks: planes of one turn share no node; where planes do, that of the lower turn adds first.
@@ -39,9 +44,14 @@ constexpr int sweep_turn(std::int32_t x, std::int32_t period) {
   return odd_one_out ? 2 : x & 1;
 }
 
-/// `tiles`: keys of the lowest blocks of their stacks, in order; `boundary`: for each tile, whether it is of the
-/// boundary. `period` as above.
-[[nodiscard]] Sweep plan_sweep(std::span<const BlockKey> tiles, std::span<const char> boundary, std::int32_t period,
-                               int threads);
+/// What plan_sweep looks at of a tile.
+struct SweepTile {
+  BlockKey stack;  ///< lowest block
+  bool boundary;
+  double cost;  ///< in any unit
+};
+
+/// `tiles` in the order of their keys; `period` as above.
+[[nodiscard]] Sweep plan_sweep(std::span<const SweepTile> tiles, std::int32_t period, int threads);
 
 }  // namespace breccia::grid

@@ -41,6 +41,28 @@ TEST(BlockTable, FindsWhatWasInsertedAndNothingElse) {
   EXPECT_EQ(table.find(*keys.begin()), kNoBlock);
 }
 
+TEST(BlockTable, TakesBlocksFarApartInAnyDirectionToOtherPlaces) {
+  constexpr unsigned kBits = 12;
+  for (const BlockCoord step : {BlockCoord{1, 0, 0}, {0, 1, 0}, {0, 0, 1}, {64, 0, 0}, {1, 1, 0}, {4, 4, 4}}) {
+    std::set<std::size_t> places;
+    for (std::int32_t n = -128; n < 128; ++n) {
+      const std::size_t place = key_hash(block_key({n * step.x, n * step.y, n * step.z}), kBits);
+      ASSERT_LT(place, std::size_t{1} << kBits);
+      places.insert(place);
+    }
+    // 256 at random into 4096 places leave 248 of them on average.
+    EXPECT_GT(places.size(), 200U) << step.x << ' ' << step.y << ' ' << step.z;
+  }
+}
+
+TEST(BlockTable, HoldsMoreThanThereWasRoomFor) {
+  BlockTable table;
+  table.reserve(10);
+  for (std::int32_t n = 0; n < 5000; ++n) EXPECT_EQ(table.insert(block_key({n, 0, 0})), static_cast<std::uint32_t>(n));
+  table.reserve(20000);
+  for (std::int32_t n = 0; n < 5000; ++n) EXPECT_EQ(table.find(block_key({n, 0, 0})), static_cast<std::uint32_t>(n));
+}
+
 TEST(Periodicity, WrapsBothWaysAndLeavesOpenAxesAlone) {
   const Periodicity periodicity{{3, 0, 5}};
   EXPECT_EQ(periodicity.wrap(BlockCoord{-1, -7, 5}), (BlockCoord{2, -7, 0}));
