@@ -162,6 +162,21 @@ class FakePrograms(unittest.TestCase):
         self.assertNotIn("nccl", found["messages"])
         self.expect(1, "ranks", "2 ranks differ from one in elastic_energy", "mpi=wrong", devices=1)
 
+    def test_stages_as_on_a_card(self):
+        card = machine.Device("NVIDIA H100 80GB HBM3", 90, 1)
+        where = stages.Context(programs.Programs(100), self.folder, card, False, {})
+        tests, rates, gravity, messages = {}, [], [], {}
+        said = io.StringIO()
+        with contextlib.redirect_stdout(said):
+            failed = (stages.compare_with_host(where, tests) + stages.measure_engine(where, rates)
+                      + stages.measure_gravity(where, gravity) + stages.collide_on_ranks(where, messages))  # fmt: skip
+        self.assertEqual((failed, tests["steps"], messages["devices"]), ([], 200, 1))
+        self.assertEqual([rate["case"] for rate in rates], ["paper", "debris", "cell8_1e6"])
+        # 2e9 of 11.9e9.
+        self.assertRegex(said.getvalue(), r"cell8_1e6 +mixed +2000.000 +2000.0 +11\d\d\d +17 %")
+        self.assertEqual([g["particles"] for g in gravity], [94648, 1000000])
+        self.assertEqual(messages["steps"] % 32, 0)
+
     def test_time_is_up(self):
         begin = time.monotonic()
         process, found = self.run_with("gravity=hangs", "--limit", "6")
