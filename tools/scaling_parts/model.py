@@ -329,12 +329,12 @@ def fit(runs, network, name="this machine", word=4):
     )
 
 
-# Assumptions, not measurements (docs/scaling.md): one device a rank, its memory's bandwidth half used, a message through
-# InfiniBand NDR with kernels that pack it, gravity on the device.
+# Particles, tiles and launches from an H100's rates without gravity (docs/gpu.md, at 65 and at 376 particles a tile); the
+# rest are assumptions (docs/scaling.md): a message through InfiniBand NDR with kernels that pack it, gravity on the device.
 H100 = Machine(
-    name="H100, one a rank (assumed)",
-    particle=0.4e-9,
-    tile=20e-9,
+    name="H100, one a rank (network and gravity assumed)",
+    particle=0.23e-9,
+    tile=22e-9,
     fixed=15e-6,
     latency=8e-6,
     bandwidth=20e9,
