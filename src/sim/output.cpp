@@ -53,6 +53,7 @@ void Output::at(const TimeLoop& loop, bool force) {
   const bool row = rows_.due(loop.time(), loop.dt()) || force;
   const bool analysis = analysis_due(loop);
   if (!snapshot && !row && !analysis) return;
+  loop.finish_steps();
   loop.timers()("output", [&] {
     const ParticleOutput particles = loop.engine().observe();
     if (row) write_row(loop, particles);

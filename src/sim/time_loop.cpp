@@ -195,9 +195,12 @@ void TimeLoop::evaluate_gravity() {
   gravity_record_.add(stats);
 }
 
+grid::PassReport TimeLoop::finish_steps() const {
+  return timers_("checks", [&] { return engine_->passes(); });
+}
+
 void TimeLoop::check() {
-  // A device is behind what it has been told to do: here the host waits for it.
-  const grid::PassReport passes = timers_("checks", [&] { return engine_->passes(); });
+  const grid::PassReport passes = finish_steps();
   const auto steps_after = static_cast<std::uint64_t>(steps_since_sort_) - passes.fault_step;
   guard_.note(passes, step_ - steps_after, time_ - static_cast<double>(steps_after) * previous_dt_);
   guard_.check(*engine_);

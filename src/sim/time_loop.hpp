@@ -52,6 +52,8 @@ class TimeLoop {
   [[nodiscard]] const Guard& guard() const { return guard_; }
   [[nodiscard]] const BalanceState& balance() const { return balance_.state(); }
   [[nodiscard]] StageTimers& timers() const { return timers_; }
+  /// Waits for a device, which is behind what it has been told to do: its steps are no part of what comes next.
+  grid::PassReport finish_steps() const;
   /// Notes in `timeline` what is done when.
   void record(Timeline& timeline);
 

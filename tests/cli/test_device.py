@@ -70,6 +70,16 @@ class Device(CommandTest):
         for name in ("kinetic_energy [J]", "internal_energy [J]", "mass [kg]"):
             self.assertAlmostEqual(float(cuda[name]) / float(host[name]), 1.0, delta=1e-5, msg=name)
 
+    def test_steps_of_a_device_are_not_booked_as_output(self):
+        with devices(EMULATED):
+            # It ends inside a window: nothing but the output waits for the device.
+            self.assertEqual(self.run_scene("a", "--device", "cuda", steps=2).returncode, 0)
+        summary = self.summary("a")
+        seconds = {stage["stage"]: stage["seconds"] for stage in summary["stages"]}
+        # Two emulated steps take a hundred times as long as a snapshot of so few particles.
+        self.assertGreater(seconds["checks"], seconds["output"])
+        self.assertGreater(summary["wall_seconds"], seconds["checks"])
+
     def test_a_device_for_each_rank(self):
         with devices(EMULATED, 2):
             process = self.run_scene("two", "--device", "cuda", ranks=2)

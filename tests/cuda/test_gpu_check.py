@@ -179,14 +179,14 @@ class FakePrograms(unittest.TestCase):
 
     def test_time_is_up(self):
         begin = time.monotonic()
-        process, found = self.run_with("gravity=hangs", "--limit", "6")
+        process, found = self.run_with("gravity=hangs", "--limit", "15")
         self.assertEqual(process.returncode, 3, process.stdout + process.stderr)
-        self.assertLess(time.monotonic() - begin, 30)
+        self.assertLess(time.monotonic() - begin, 60)
         states = [state.partition(":")[0] for state in found["stages"].values()]
         self.assertEqual(states, ["done", "done", "not done", "not done"])
-        self.assertEqual(found["stopped"], "the time for everything, 6 s, was up")
+        self.assertEqual(found["stopped"], "the time for everything, 15 s, was up")
         self.assertEqual(len(found["rates"]), 1)
-        self.assertIn("gpu-check: stopped: the time for everything, 6 s, was up\n", process.stderr)
+        self.assertIn("gpu-check: stopped: the time for everything, 15 s, was up\n", process.stderr)
 
     def test_ranks_that_hang_are_ended(self):
         found = {}
@@ -196,10 +196,10 @@ class FakePrograms(unittest.TestCase):
         with contextlib.redirect_stdout(io.StringIO()):
             failed = stages.collide_on_ranks(where, found)
         self.assertEqual(failed, ["nccl: the run did not end in 4 s: no reason was given"])
-        self.assertLess(time.monotonic() - begin, 15)
+        self.assertLess(time.monotonic() - begin, 60)
         self.assertIn("way", found["mpi"])
         # A killed process takes its moment to go.
-        while self.programs_left() and time.monotonic() - begin < 30:
+        while self.programs_left() and time.monotonic() - begin < 90:
             time.sleep(0.1)
         self.assertEqual(self.programs_left(), [])
 

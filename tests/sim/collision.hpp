@@ -25,6 +25,22 @@ spin = [0, "0.01 rad/s", "0.02 rad/s"]
 )";
 }
 
+/// Debris that flies through all slabs, most of it without grid; some of it meets, and a body.
+inline std::string debris() {
+  return scene_of(2e3, 0.1) + R"([[body]]
+shape = "ellipsoid"
+axes = ["20 km", "9 km", "8 km"]
+[[body]]
+shape = "box"
+lattice = "random"
+particles = 300
+size = ["160 km", "100 km", "100 km"]
+position = ["130 km", 0, 0]
+velocity = ["-2500 m/s", "200 m/s", 0]
+spin = [0, "0.02 rad/s", 0]
+)";
+}
+
 /// Spheres of 100 km that meet at 200 m/s and 15 degrees, 6 km before contact: forces start at a gap of a cell. The
 /// step is the same part of a cell as in the flagship run.
 inline std::string collision(double cell) {

@@ -1,4 +1,4 @@
-// The same run with any number of threads, bit for bit.
+// The same run with any number of threads of a rank, bit for bit and in the same order in memory.
 #include <gtest/gtest.h>
 
 #include <cstring>
@@ -18,9 +18,10 @@ class Threads : public testing::TestWithParam<const char*> {
   // 100 steps: damage, contact, several sortings and gravity windows.
   void expect_same(const std::string& text) const {
     const Scene scene = load(text, {std::string("numerics.precision=") + GetParam()});
-    const ParticleOutput one = state_after(100, scene);
+    const mpi::Comm world;
+    const ParticleOutput one = state_after(100, scene, world);
     for (const int threads : {2, 3}) {
-      const ParticleOutput many = state_after(100, scene, mpi::Comm(MPI_COMM_SELF), threads);
+      const ParticleOutput many = state_after(100, scene, world, threads);
       EXPECT_TRUE(same_bits(many.id, one.id));
       EXPECT_TRUE(same_bits(many.position, one.position));
       EXPECT_TRUE(same_bits(many.velocity, one.velocity));
@@ -33,6 +34,8 @@ class Threads : public testing::TestWithParam<const char*> {
 };
 
 TEST_P(Threads, GiveTheSameCollision) { expect_same(collision(9e3)); }
+TEST_P(Threads, GiveTheSameOfDebris) { expect_same(debris()); }
+TEST_P(Threads, GiveTheSameOfWhatLeavesItsSlab) { expect_same(flying_body("8 km")); }
 TEST_P(Threads, GiveTheSameOnAPeriodicAxis) {
   for (const int blocks : {1, 3, 4}) expect_same(periodic_slide(blocks));
   for (const int blocks : {1, 5}) expect_same(periodic_slide(blocks, 2));
