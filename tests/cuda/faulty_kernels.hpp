@@ -1,6 +1,8 @@
 // A sum over a block and a count over all blocks, right and with one mistake each: what the emulation must catch.
 #pragma once
 
+#include <limits>
+
 #include "cuda/device_runtime.hpp"
 
 namespace breccia::cuda_test {
@@ -12,7 +14,17 @@ struct Values {
   int end[1];
 };
 
-enum class Fault { kNone, kNoBarrier, kDivergentBarrier, kEarlyExit, kOverrun, kNoAtomic, kGlobalOverrun, kLostLane };
+enum class Fault {
+  kNone,
+  kNoBarrier,
+  kDivergentBarrier,
+  kEarlyExit,
+  kOverrun,
+  kNoAtomic,
+  kGlobalOverrun,
+  kLostLane,
+  kOverflow
+};
 
 /// total += sum over the blocks of 0 + 1 + ... + 63.
 template <Fault kFault>
@@ -33,6 +45,7 @@ __global__ void sum_of_blocks(int* total) {
     if (t % 2 == 0) sum = __shfl_sync(0xffffffffU, sum, 0);
   }
   if (t != 0) return;
+  if (kFault == Fault::kOverflow) sum += std::numeric_limits<int>::max();
   if (kFault == Fault::kNoAtomic) {
     *total = *total + sum;
   } else {
