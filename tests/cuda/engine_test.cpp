@@ -301,6 +301,31 @@ TEST_P(CudaEngineTest, TooLittleMemoryIsSaidBefore) {
   EXPECT_NE(message.find(" bytes), 0.01 GB available ("), std::string::npos) << message;
 }
 
+// What a device says when it is to run with these properties; empty if it does.
+std::string refusal(const char* variable, const char* value, Precision precision) {
+  setenv(variable, value, 1);
+  std::string message;
+  try {
+    make_cuda_engine(setup_for(small_impact(precision)));
+  } catch (const UsageError& error) {
+    message = error.what();
+  }
+  unsetenv(variable);
+  return message;
+}
+
+// Of little shared memory, of which mixed precision takes half, and of any other reason in the words of the runtime.
+TEST_P(CudaEngineTest, UnfitDeviceIsRefusedWithTheReason) {
+  const std::string of_shared_memory = refusal("BRECCIA_EMULATED_SHARED", "101376", GetParam());
+  if (GetParam() == Precision::kDouble) {
+    EXPECT_NE(of_shared_memory.find("101376 bytes of shared memory"), std::string::npos) << of_shared_memory;
+  } else {
+    EXPECT_EQ(of_shared_memory, "");
+  }
+  const std::string of_kernels = refusal("BRECCIA_EMULATED_CAPABILITY", "75", GetParam());
+  EXPECT_NE(of_kernels.find("no kernel image is available"), std::string::npos) << of_kernels;
+}
+
 TEST_P(CudaEngineTest, FreesWhatItTook) {
   const std::size_t before = cuda_emulation::live_allocations();
   { const Pair pair(debris(GetParam()), kRock, 12); }
