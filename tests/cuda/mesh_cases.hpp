@@ -3,14 +3,17 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <numeric>
 #include <vector>
 
 #include "cuda/box_gravity.hpp"
+#include "cuda/device_census.hpp"
 #include "cuda/stream.hpp"
 #include "gravity/mesh/convolution.hpp"
+#include "gravity/mesh/host_census.hpp"
 
 namespace breccia::cuda {
 
@@ -82,6 +85,27 @@ struct BoxOfBodies {
   }
 };
 
+// The same on a device.
+class BodiesOnDevice {
+ public:
+  BodiesOnDevice(const BoxOfBodies& bodies, cudaStream_t stream) : values_(4 * BoxOfBodies::kCount) {
+    std::vector<double> values;
+    for (const Vec3d p : bodies.position) values.push_back(p.x);
+    for (const Vec3d p : bodies.position) values.push_back(p.y);
+    for (const Vec3d p : bodies.position) values.push_back(p.z);
+    values.insert(values.end(), bodies.mass.begin(), bodies.mass.end());
+    values_.upload(values, stream);
+  }
+  [[nodiscard]] BodyArrays arrays() const {
+    constexpr std::size_t n = BoxOfBodies::kCount;
+    const double* x = values_.data();
+    return {{x, x + n, x + 2 * n}, x + 3 * n, static_cast<unsigned>(n)};
+  }
+
+ private:
+  DeviceArray<double> values_;
+};
+
 template <class Real>
 std::vector<Vec3d> box_field_of_host(const BoxOfBodies& bodies, const gravity::BoxSettings& settings) {
   std::vector<Vec3d> acceleration(BoxOfBodies::kCount);
@@ -98,25 +122,31 @@ template <class Real>
 std::vector<double> box_field_of_device(const BoxOfBodies& bodies, const gravity::BoxSettings& settings,
                                         const mpi::Comm& world) {
   const Stream stream;
-  constexpr std::size_t n = BoxOfBodies::kCount;
-  std::vector<double> values(4 * n);
-  for (std::size_t i = 0; i < n; ++i) {
-    values[i] = bodies.position[i].x;
-    values[n + i] = bodies.position[i].y;
-    values[2 * n + i] = bodies.position[i].z;
-    values[3 * n + i] = bodies.mass[i];
-  }
-  DeviceArray<double> all(values.size());
-  all.upload(values, stream);
-  const double* x = all.data();
-  const auto own = static_cast<unsigned>(n) / static_cast<unsigned>(world.size());
+  const BodiesOnDevice on_device(bodies, stream);
+  const auto own = static_cast<unsigned>(BoxOfBodies::kCount) / static_cast<unsigned>(world.size());
   DeviceArray<double> acceleration(std::size_t{3} * own);
   acceleration.fill_bytes(0, stream);
   gravity::Stats stats;
   BoxGravity<Real>(world, stream)
-      .add_field({{x, x + n, x + 2 * n}, x + 3 * n, static_cast<unsigned>(n)}, settings,
-                 own * static_cast<unsigned>(world.rank()), own, acceleration.data(), stats);
+      .add_field(on_device.arrays(), settings, own * static_cast<unsigned>(world.rank()), own, acceleration.data(),
+                 stats);
   return acceleration.download(std::size_t{3} * own, stream);
+}
+
+// Of blocks that are full.
+inline void expect_counts_are_hosts() {
+  const Stream stream;
+  const BoxOfBodies bodies;
+  const BodiesOnDevice on_device(bodies, stream);
+  DeviceCensus device(stream);
+  device.take(on_device.arrays(), *std::max_element(bodies.mass.begin(), bodies.mass.end()));
+  gravity::HostCensus host({bodies.position, bodies.mass}, 1);
+  device.divide(3.0 * BoxOfBodies::kCell);
+  host.divide(3.0 * BoxOfBodies::kCell);
+  std::vector<gravity::BlockIndex> full;
+  for (const gravity::BlockCount& b : device.crowded(8)) full.push_back(b.index);
+  ASSERT_FALSE(full.empty());
+  EXPECT_EQ(device.counts(full), host.counts(full));
 }
 
 // Mesh and near pairs of a box, with a short-range law of each degree that there is a kernel for.

@@ -57,6 +57,7 @@ void use_only(const void* memory, std::size_t bytes);
 struct Substitute {
   std::vector<std::size_t> parameter_bytes;
   void (*run)(const std::byte* parameters);
+  mutable std::uint64_t launches = 0;
 };
 using Substitutes = std::map<std::string, Substitute>;
 /// From now on these run in place of the kernels of their names; a launch of another one is an error. Null: the kernels

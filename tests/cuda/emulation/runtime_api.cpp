@@ -130,6 +130,7 @@ const Substitute* substitute_for(const std::string& kernel, const std::vector<st
   if (found == substitutes->end()) throw EmulationError(kernel + " has no translation");
   if (found->second.parameter_bytes != parameter_bytes)
     throw EmulationError(kernel + ": its parameters have other sizes where it was translated");
+  ++found->second.launches;
   return &found->second;
 }
 

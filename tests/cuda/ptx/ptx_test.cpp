@@ -60,6 +60,7 @@ void expect_equal_to_host(const Scene& scene, const EngineSetup& setup, int step
   EXPECT_NEAR(a.sound, b.sound, tolerance * b.sound);
   const double work = host->passes().viscous_work;
   EXPECT_NEAR(comm.sum(device->passes().viscous_work), work, 10 * tolerance * work);
+  EXPECT_FALSE(device->strayed());
   EXPECT_EQ(device->finish_damage(), host->finish_damage());
 }
 
@@ -128,6 +129,11 @@ TEST_P(Ptx, GravityEqualsHost) {
   EXPECT_EQ(mesh.device_stats.boxes, 2);
 }
 
+TEST_P(Ptx, CountsOfBlocksAreHosts) {
+  const Translated translated("production", arch());
+  expect_counts_are_hosts();
+}
+
 TEST_P(Ptx, ShortRangeLawsEqualHosts) {
   const Translated translated("production", arch());
   precision() == Precision::kDouble ? expect_box_is_hosts<double>(self()) : expect_box_is_hosts<float>(self());
@@ -157,6 +163,21 @@ std::string name_of(const testing::TestParamInfo<Ptx::ParamType>& p) {
 }
 INSTANTIATE_TEST_SUITE_P(All, Ptx, kAll, name_of);
 INSTANTIATE_TEST_SUITE_P(All, PtxOnRanks, kAll, name_of);
+
+// Comes after all others of one rank, and looks at what these have run.
+class PtxKernels : public testing::TestWithParam<const char*> {};
+
+TEST_P(PtxKernels, HaveAllRun) {
+  std::vector<std::string> never;
+  for (const auto& [name, kernel] : cuda_ptx::translations("production", GetParam())) {
+    if (kernel.launches == 0) never.push_back(name);
+  }
+  EXPECT_EQ(never, (std::vector<std::string>{"collect_shared<double>", "collect_shared<float>", "take_nodes<double>",
+                                             "take_nodes<float>"}))
+      << "beside those of PtxOnRanks";
+}
+INSTANTIATE_TEST_SUITE_P(All, PtxKernels, testing::Values("sm_80", "sm_90"),
+                         [](const auto& p) { return std::string(p.param); });
 
 // Mistakes in what nvcc emits are found at the access or barrier.
 class PtxFaults : public testing::Test {
