@@ -32,7 +32,8 @@ __global__ void sum_of_blocks(int* total) {
   BRECCIA_SHARED(Values, values);
   const int t = static_cast<int>(threadIdx.x);
   // The last thread writes first what the others read last.
-  values.of[kFault == Fault::kOverrun ? t + 2 : kThreads - 1 - t] = t;
+  int* const of = values.of;  // a pointer, whose bounds no compiler knows
+  of[kFault == Fault::kOverrun ? t + 2 : kThreads - 1 - t] = t;
   if (kFault == Fault::kEarlyExit && t == 5) return;
   if (kFault == Fault::kDivergentBarrier && t >= 32) {
     __syncthreads();  // NOLINT(bugprone-branch-clone): another one than the next
