@@ -171,12 +171,16 @@ template <class P>
 grid::PassReport CudaEngine<P>::passes() const {
   halo_.watch(stream_);
   launch_total(pass_sums_.data(), grid_.pass_blocks(), total_.data(), stream_);
-  const PassSums sums = total_.download(1, stream_)[0];
+  PassSums sums;
+  unsigned clamped = 0;
+  check(cudaMemcpyAsync(&sums, total_.data(), sizeof sums, cudaMemcpyDeviceToHost, stream_), "sums of the passes");
+  check(cudaMemcpyAsync(&clamped, counts_.data() + 1, sizeof clamped, cudaMemcpyDeviceToHost, stream_), "count");
+  check(cudaStreamSynchronize(stream_), "sums of the passes");
   grid::PassReport report;
   report.plastic_work = sums.plastic_work;
   report.viscous_work = sums.viscous_work;
   report.largest_move = sums.largest_move;
-  report.clamped = counts_.download(2, stream_)[1];
+  report.clamped = clamped;
   if (sums.largest_move >= 1.0) {
     // The device keeps no state from before the step.
     const grid::ParticleSample worst = fastest().value();

@@ -9,7 +9,7 @@
 #include "cuda/cuda_gravity.hpp"
 #include "cuda/device_array.hpp"
 #include "cuda/device_grid.hpp"
-#include "cuda/device_memory.hpp"
+#include "cuda/device_load.hpp"
 #include "cuda/device_particles.hpp"
 #include "cuda/halo.hpp"
 #include "cuda/launchers.hpp"
@@ -74,7 +74,7 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   };
   [[nodiscard]] ParticleOutput read_particles(const GridView& grid) const;
   // On several ranks (cuda_engine_ranks.cpp).
-  [[nodiscard]] OwnPlanes own_planes() const;
+  [[nodiscard]] OwnPlanes own_planes() const { return planes_of_rank(slabs_, comm_.rank()); }
   void migrate();
   void take(std::span<const unsigned> staying, std::vector<grid::BlockKey> keys,
             const std::vector<std::vector<std::byte>>& messages);

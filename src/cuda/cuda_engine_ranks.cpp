@@ -21,15 +21,6 @@ constexpr std::uint64_t kTileWork = 12600;
 }  // namespace
 
 template <class P>
-OwnPlanes CudaEngine<P>::own_planes() const {
-  OwnPlanes planes{.axis = slabs_.axis()};
-  const auto rank = static_cast<std::size_t>(comm_.rank());
-  if (rank > 0) planes.low = mpi::block_of_plane(slabs_.cuts()[rank - 1]);
-  if (rank < slabs_.cuts().size()) planes.high = mpi::block_of_plane(slabs_.cuts()[rank]);
-  return planes;
-}
-
-template <class P>
 void CudaEngine<P>::migrate() {
   if (comm_.size() == 1) return;
   unsigned too_far = 0;

@@ -1,5 +1,6 @@
 #include "cuda/device_grid.hpp"
 
+#include <array>
 #include <bit>
 
 #include "cuda/launchers.hpp"
@@ -11,12 +12,7 @@ constexpr int kCellBits = 6;  // of a cell in its block
 static_assert(grid::kBlockNodes == 1 << kCellBits);
 
 // One number that the host needs to go on.
-unsigned number_at(const unsigned* address, cudaStream_t stream) {
-  unsigned value = 0;
-  check(cudaMemcpyAsync(&value, address, sizeof value, cudaMemcpyDeviceToHost, stream), "count");
-  check(cudaStreamSynchronize(stream), "count");
-  return value;
-}
+unsigned number_at(const unsigned* address, cudaStream_t stream) { return read_back(std::array{address}, stream)[0]; }
 
 CompactKeys compact_layout(const PlaceReport& report) {
   CompactKeys keys;
@@ -119,8 +115,10 @@ void DeviceGrid<P>::separate(const ParticleView<Real>& view, unsigned count, con
   launch_separate(runs_, hash, view.node, order_.data(), periodicity_, planes, lone_without_grid_, stream);
   exclusive_scan(runs_.tiles, runs_.count + 1, scratch_, stream);
   exclusive_scan(runs_.tiled, runs_.count + 1, scratch_, stream);
-  tiles_ = number_at(runs_.tiles + runs_.count, stream);
-  tiled_ = number_at(runs_.tiled + runs_.count, stream);
+  const std::array<const unsigned*, 2> last{runs_.tiles + runs_.count, runs_.tiled + runs_.count};
+  const auto [tiles, tiled] = read_back(last, stream);
+  tiles_ = tiles;
+  tiled_ = tiled;
   lone_ = count - tiled_;
 }
 
@@ -129,7 +127,9 @@ void DeviceGrid<P>::connect(const ParticleView<Real>& view, cudaStream_t stream)
   const BlockHash hash = cleared_hash(std::size_t{tiles_} * 27, stream);
   launch_insert_all(block_keys_.data(), tiles_, hash, stream);
   block_count_.reserve(1);
-  block_count_.upload(std::span<const unsigned>(&tiles_, 1), stream);
+  check(
+      cudaMemcpyAsync(block_count_.data(), runs_.tiles + runs_.count, sizeof tiles_, cudaMemcpyDeviceToDevice, stream),
+      "copy");
   launch_reach(tile_first_.data(), tiles_, view.node, periodicity_, hash, block_keys_.data(), block_count_.data(),
                stream);
   blocks_ = number_at(block_count_.data(), stream);

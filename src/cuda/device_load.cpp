@@ -34,6 +34,15 @@ void reach(BlockCoord own, unsigned sides, const grid::Periodicity& periodicity,
 
 }  // namespace
 
+OwnPlanes planes_of_rank(const mpi::Slabs& slabs, int rank) {
+  const std::vector<std::int32_t>& cuts = slabs.cuts();
+  const auto at = static_cast<std::size_t>(rank);
+  OwnPlanes planes{.axis = slabs.axis()};
+  if (at > 0) planes.low = mpi::block_of_plane(cuts[at - 1]);
+  if (at < cuts.size()) planes.high = mpi::block_of_plane(cuts[at]);
+  return planes;
+}
+
 Load count_load(const EngineState& state, std::uint64_t flaws, const grid::Periodicity& periodicity,
                 bool lone_without_grid, const OwnPlanes& planes) {
   grid::Occupancy occupancy;
@@ -58,7 +67,10 @@ Load count_load(const EngineState& state, std::uint64_t flaws, const grid::Perio
   Load load{.particles = state.particles, .flaws = flaws};
   grid::BlockTable blocks;
   for (std::uint32_t b = 0; b < occupied; ++b) {
-    if (lone_without_grid && is_alone(b)) continue;
+    if (lone_without_grid && is_alone(b)) {
+      ++load.lone;
+      continue;
+    }
     ++load.tiles;
     reach(grid::block_coord(occupancy.blocks()[b].block), sides[b], periodicity, blocks);
   }

@@ -1,11 +1,13 @@
 #include "cuda/device_memory.hpp"
 
+#include <algorithm>
 #include <bit>
 #include <string>
 
 #include "breccia/error.hpp"
 #include "cuda/check.hpp"
 #include "cuda/device_particles.hpp"
+#include "cuda/observe_kernels.hpp"
 #include "cuda/step_arguments.hpp"
 #include "mpi/together.hpp"
 
@@ -46,6 +48,18 @@ std::string gigabytes(std::uint64_t bytes) {
   return std::to_string(hundredths / 100) + "." + places.substr(1) + " GB";
 }
 
+// What a particle takes for a while, when all arrays of the sorting are still there: at outputs what the grid says of
+// it (CudaEngine::observe), and where particles have come from other ranks a field twice, with what is to stay
+// (DeviceParticles::replace).
+template <class P>
+std::uint64_t passing_bytes() {
+  std::size_t widest = 0;
+  for (const grid::FieldDescriptor& f : device_fields<P>()) {
+    widest = std::max(widest, static_cast<std::size_t>(f.element_bytes) * static_cast<std::size_t>(f.components));
+  }
+  return std::max(kProbedReals * sizeof(typename P::Real), widest + sizeof(unsigned));
+}
+
 }  // namespace
 
 template <class P>
@@ -54,13 +68,15 @@ std::uint64_t bytes_needed(std::size_t record, const Load& load) {
   // Beside its fields: some of them while all are rearranged, keys and order of the sorting twice, four numbers of its
   // run, places in hash tables of up to four entries.
   constexpr std::uint64_t sorting = kRearrangedBytes + 2 * (8 + 8 + 4) + 4 * 4 + 8 + 4 * 12;
+  constexpr std::uint64_t lone = 6 * real + sizeof(std::int32_t);
   constexpr std::uint64_t tile_hash = 2 * 2 * 27 * 12;
   constexpr std::uint64_t tile = kSums * kTileNodes * real + 27 * sizeof(grid::BlockKey) + sizeof(PassSums) + 8;
   constexpr std::uint64_t block = kSums * grid::kBlockNodes * real + 27 * sizeof(unsigned);
   // Of other ranks as much is received as is sent.
   constexpr std::uint64_t shared = 2 * kSums * grid::kBlockNodes * real + 6 * sizeof(unsigned);
-  const std::uint64_t all = load.particles * (record + sorting) + load.tiles * (tile + tile_hash) +
-                            load.blocks * block + load.shared * shared + load.flaws * sizeof(float);
+  const std::uint64_t all = load.particles * (record + sorting + passing_bytes<P>()) + load.lone * lone +
+                            load.tiles * (tile + tile_hash) + load.blocks * block + load.shared * shared +
+                            load.flaws * sizeof(float);
   return all + all / 8;  // room that arrays keep (DeviceArray::reserve)
 }
 

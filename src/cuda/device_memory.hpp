@@ -12,14 +12,15 @@ namespace breccia::cuda {
 /// What a rank holds.
 struct Load {
   std::uint64_t particles = 0;
+  std::uint64_t lone = 0;  ///< of them, without a tile
   std::uint64_t tiles = 0;
   std::uint64_t blocks = 0;
   std::uint64_t shared = 0;  ///< sums of blocks that go to other ranks, at most
   std::uint64_t flaws = 0;
 };
 
-/// All arrays of the engine, those of sortings and of the exchange between ranks included [bytes]. `record`: bytes of a
-/// particle's fields.
+/// All arrays of the engine, those of sortings, outputs and of the exchange between ranks included [bytes]. `record`:
+/// bytes of a particle's fields.
 template <class P>
 std::uint64_t bytes_needed(std::size_t record, const Load& load);
 

@@ -17,7 +17,7 @@ std::uint64_t engine_bytes(const DevicePlan& plan) {
   const grid::BoundarySet boundaries(plan.setup.boundaries, plan.setup.cell);
   Load load = count_load(plan.sample, plan.flaws, boundaries.periodicity(),
                          plan.setup.numerics.lone_without_grid && !boundaries.has_walls(), {});
-  for (std::uint64_t* count : {&load.particles, &load.tiles, &load.blocks, &load.flaws}) {
+  for (std::uint64_t* count : {&load.particles, &load.lone, &load.tiles, &load.blocks, &load.flaws}) {
     *count = static_cast<std::uint64_t>(std::ceil(static_cast<double>(*count) * plan.scale / plan.ranks));
   }
   return bytes_needed<P>(DeviceParticles<P>(grid::groups_for(plan.setup)).record_bytes(), load);

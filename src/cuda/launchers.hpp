@@ -1,6 +1,8 @@
 // The kernels as the engine calls them, from files that no CUDA compiler reads. All of them only enqueue.
 #pragma once
 
+#include <string>
+
 #include "cuda/device_runtime.hpp"
 #include "cuda/step_arguments.hpp"
 
@@ -13,7 +15,10 @@ inline constexpr int kPassBlocks = sizeof(Real) == 4 ? 4 : 2;
 
 constexpr unsigned blocks_for(unsigned items, unsigned threads) { return (items + threads - 1) / threads; }
 
-/// Allows the shared memory of the tile pass. Once for a device.
+/// Allows the shared memory of the tile pass; why the current device cannot run it, or nothing.
+template <class Real>
+std::string why_no_tile_pass();
+/// The same, once for an engine. Throws UsageError with the reason.
 template <class Real>
 void prepare_tile_pass();
 /// The whole pass over the particles in tiles (tile_pass.cuh), or over some of them; no tiles: nothing.

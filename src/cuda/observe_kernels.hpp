@@ -14,6 +14,8 @@ struct ProbeArguments {
   Real* gradient = nullptr;      ///< [9][count] C^{n+1/2}, row by row [1/s]
   unsigned count = 0;
 };
+/// Of a particle.
+inline constexpr std::size_t kProbedReals = 3 + 1 + 9;
 template <class Real>
 void launch_probe(const ProbeArguments<Real>& a, cudaStream_t stream);
 

@@ -5,23 +5,41 @@
 #include "cuda/device_memory.hpp"
 #include "cuda/device_plan.hpp"
 #include "cuda/halo_messages.hpp"
+#include "cuda/launchers.hpp"
 #include "cuda/plugin_interface.hpp"
 
 namespace breccia::cuda {
 namespace {
 
+// What the kernels are compiled for, and more (CMAKE_CUDA_ARCHITECTURES).
+constexpr int kLeastMajor = 8;
+
+// Why the engine cannot run on the current device. The precision is not known yet: what the smaller one takes.
+std::string why_unfit(const cudaDeviceProp& device) {
+  if (device.major < kLeastMajor) {
+    return "it has compute capability " + std::to_string(device.major) + "." + std::to_string(device.minor) +
+           ", and the engine needs " + std::to_string(kLeastMajor) + ".0";
+  }
+  return why_no_tile_pass<float>();
+}
+
 const char* select_device(int local_rank, std::string& name) {
   int count = 0;
-  const cudaError_t status = cudaGetDeviceCount(&count);
+  cudaError_t status = cudaGetDeviceCount(&count);
+  if (status == cudaSuccess && count == 0) status = cudaErrorNoDevice;
+  const int device = count > 0 ? local_rank % count : 0;
+  cudaDeviceProp properties{};
+  if (status == cudaSuccess) status = cudaSetDevice(device);
+  if (status == cudaSuccess) status = cudaGetDeviceProperties(&properties, device);
   if (status != cudaSuccess) {
     (void)cudaGetLastError();
     return cudaGetErrorString(status);
   }
-  if (count == 0) return "no CUDA device";
-  const int device = local_rank % count;
-  cudaDeviceProp properties{};
-  if (cudaSetDevice(device) != cudaSuccess || cudaGetDeviceProperties(&properties, device) != cudaSuccess) {
-    return "the CUDA device cannot be used";
+  static std::string unfit;  // for the caller to read
+  unfit = why_unfit(properties);
+  if (!unfit.empty()) {
+    unfit = std::string(properties.name) + " cannot be used: " + unfit;
+    return unfit.c_str();
   }
   name = std::string(properties.name) + " (" + std::to_string(device + 1) + " of " + std::to_string(count) + ")";
   return nullptr;

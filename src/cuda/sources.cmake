@@ -9,3 +9,6 @@ set(breccia_cuda_host body_sets.cpp box_gravity.cpp cuda_engine.cpp cuda_engine_
                       unsplit_gravity.cpp)
 list(TRANSFORM breccia_cuda_kernels PREPEND ${CMAKE_SOURCE_DIR}/src/cuda/)
 list(TRANSFORM breccia_cuda_host PREPEND ${CMAKE_SOURCE_DIR}/src/cuda/)
+# For nvcc. Floats below the normal ones are zero; quotients and roots of floats may be two units in the last place off.
+set(breccia_cuda_flags --expt-relaxed-constexpr -ftz=true)
+set(breccia_cuda_rounding -prec-div=false -prec-sqrt=false)

@@ -227,14 +227,30 @@ __global__ void __launch_bounds__(kPassThreads, kPassBlocks<Real>) tile_pass(Pas
 }
 
 template <class Real>
-void prepare_tile_pass() {
-  if (cudaFuncSetAttribute(&tile_pass<Real>, cudaFuncAttributeMaxDynamicSharedMemorySize, sizeof(TileShared<Real>)) !=
-      cudaSuccess) {
-    (void)cudaGetLastError();
-    throw UsageError("this device has not the " + std::to_string(sizeof(TileShared<Real>)) +
-                     " bytes of shared memory that a tile takes in this precision: use --device host, or another "
-                     "numerics.precision or device");
+std::string why_no_tile_pass() {
+  constexpr std::size_t needed = sizeof(TileShared<Real>);
+  int device = 0;
+  int most = 0;
+  cudaError_t status = cudaGetDevice(&device);
+  if (status == cudaSuccess) status = cudaDeviceGetAttribute(&most, cudaDevAttrMaxSharedMemoryPerBlockOptin, device);
+  if (status == cudaSuccess && static_cast<std::size_t>(most) < needed) {
+    return "it has " + std::to_string(most) + " bytes of shared memory for a thread block, and a tile takes " +
+           std::to_string(needed);
   }
+  if (status == cudaSuccess) {
+    status = cudaFuncSetAttribute(&tile_pass<Real>, cudaFuncAttributeMaxDynamicSharedMemorySize, needed);
+  }
+  if (status == cudaSuccess) return "";
+  (void)cudaGetLastError();
+  return cudaGetErrorString(status);
+}
+
+template <class Real>
+void prepare_tile_pass() {
+  const std::string why_not = why_no_tile_pass<Real>();
+  if (why_not.empty()) return;
+  throw UsageError("this device cannot run in this precision: " + why_not +
+                   "; use --device host, or another numerics.precision or device");
 }
 
 template <class Real>

@@ -3,6 +3,7 @@
 
 namespace breccia::cuda {
 
+template std::string why_no_tile_pass<double>();
 template void prepare_tile_pass<double>();
 template void launch_tile_pass<double>(const PassArguments<double>&, cudaStream_t);
 

@@ -3,6 +3,7 @@
 
 namespace breccia::cuda {
 
+template std::string why_no_tile_pass<float>();
 template void prepare_tile_pass<float>();
 template void launch_tile_pass<float>(const PassArguments<float>&, cudaStream_t);
 

@@ -139,6 +139,25 @@ class Device(CommandTest):
                 self.assert_fails(process, 2, "emulated device has not enough memory")
                 self.assertRegex(process.stderr, rf"needed by {ranks} ranks? \(\d+ bytes\), 0.01 GB available")
 
+    def test_device_that_is_unfit(self):
+        unfit = "emulated device cannot be used: it has "
+        for variable, value, words in (
+            ("BRECCIA_EMULATED_CAPABILITY", "75", "compute capability 7.5, and the engine needs 8.0"),
+            ("BRECCIA_EMULATED_SHARED", "49152", "49152 bytes of shared memory for a thread block, and a tile takes "),
+        ):
+            with devices(EMULATED), mock.patch.dict(os.environ, {variable: value}):
+                self.assert_fails(self.run_scene("a", "--device", "cuda"), 2, f"--device cuda: {unfit}{words}")
+                process = self.run_scene(variable, steps=2)
+                self.assertEqual(process.returncode, 0, process.stderr)
+                self.assertIn(f"device: host ({unfit}{words}", process.stdout)
+
+    def test_device_for_mixed_precision_only(self):
+        with devices(EMULATED), mock.patch.dict(os.environ, BRECCIA_EMULATED_SHARED="101376"):
+            self.assertEqual(self.run_scene("a", "--device", "cuda", steps=2).returncode, 0)
+            for ranks in (1, 2):
+                process = self.run_scene("b", "--device", "cuda", "--set", "numerics.precision=double", ranks=ranks)
+                self.assert_fails(process, 2, "cannot run in this precision: it has 101376 bytes of shared memory")
+
     def test_run_continues_on_the_other_device(self):
         with devices(EMULATED):
             first = self.run_scene("out", "--walltime", "0", "--device", "cuda")

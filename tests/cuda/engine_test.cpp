@@ -6,8 +6,6 @@
 #include <cstdlib>
 
 #include "breccia/error.hpp"
-#include "cuda/device_load.hpp"
-#include "grid/setup_choices.hpp"
 #include "tests/cuda/engine_cases.hpp"
 
 namespace breccia::cuda {
@@ -261,19 +259,14 @@ TEST_P(CudaEngineTest, StepIsThreeLaunchesWithoutWaiting) {
   EXPECT_EQ(cuda_emulation::synchronisation_count(), waits);
 }
 
-// What is asked of the device before a run is what it takes, and not much more.
+// What is asked of the device before a run is what it takes, and not much more; in dust there is nothing to spare.
 TEST_P(CudaEngineTest, MemoryIsKnownBefore) {
-  for (const Scene& scene : {small_impact(GetParam()), debris(GetParam())}) {
+  for (const Scene& scene : {small_impact(GetParam()), debris(GetParam()), dust(GetParam())}) {
     const EngineSetup setup = setup_for(scene);
     const auto host = grid::make_host_engine(setup, self());
     fill(*host, scene);
     const Load load = count_load(host->save(), host->flaws().threshold.size(), {}, true, {});
-    const std::uint64_t needed =
-        GetParam() == Precision::kDouble
-            ? bytes_needed<DoublePrecision>(DeviceParticles<DoublePrecision>(grid::groups_for(setup)).record_bytes(),
-                                            load)
-            : bytes_needed<MixedPrecision>(DeviceParticles<MixedPrecision>(grid::groups_for(setup)).record_bytes(),
-                                           load);
+    const std::uint64_t needed = bytes_asked(setup, load);
     const auto device = make_cuda_engine(setup);
     const std::size_t before = cuda_emulation::most_bytes();
     cuda_emulation::forget_most_bytes();
@@ -284,6 +277,9 @@ TEST_P(CudaEngineTest, MemoryIsKnownBefore) {
     device->update_grid(kStep);
     device->gather(kStep);
     device->sort();
+    device->scatter(0.5 * kStep);
+    device->update_grid(kStep);
+    (void)device->observe();
     EXPECT_LE(cuda_emulation::most_bytes(), needed + 4096) << before;  // and what no particle determines
     EXPECT_GE(cuda_emulation::most_bytes(), needed / 2);
   }
@@ -303,6 +299,31 @@ TEST_P(CudaEngineTest, TooLittleMemoryIsSaidBefore) {
   EXPECT_NE(message.find("has not enough memory for the particles"), std::string::npos) << message;
   EXPECT_NE(message.find(" needed by 1 rank ("), std::string::npos) << message;
   EXPECT_NE(message.find(" bytes), 0.01 GB available ("), std::string::npos) << message;
+}
+
+// What a device says when it is to run with these properties; empty if it does.
+std::string refusal(const char* variable, const char* value, Precision precision) {
+  setenv(variable, value, 1);
+  std::string message;
+  try {
+    make_cuda_engine(setup_for(small_impact(precision)));
+  } catch (const UsageError& error) {
+    message = error.what();
+  }
+  unsetenv(variable);
+  return message;
+}
+
+// Of little shared memory, of which mixed precision takes half, and of any other reason in the words of the runtime.
+TEST_P(CudaEngineTest, UnfitDeviceIsRefusedWithTheReason) {
+  const std::string of_shared_memory = refusal("BRECCIA_EMULATED_SHARED", "101376", GetParam());
+  if (GetParam() == Precision::kDouble) {
+    EXPECT_NE(of_shared_memory.find("101376 bytes of shared memory"), std::string::npos) << of_shared_memory;
+  } else {
+    EXPECT_EQ(of_shared_memory, "");
+  }
+  const std::string of_kernels = refusal("BRECCIA_EMULATED_CAPABILITY", "75", GetParam());
+  EXPECT_NE(of_kernels.find("no kernel image is available"), std::string::npos) << of_kernels;
 }
 
 TEST_P(CudaEngineTest, FreesWhatItTook) {

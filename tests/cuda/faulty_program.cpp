@@ -30,11 +30,12 @@ int main(int count, char** arguments) {
   if (fault == "no_atomic") run<Fault::kNoAtomic>(total, stream);
   if (fault == "overrun") run<Fault::kOverrun>(total, stream);
   if (fault == "global_overrun" || fault == "room_overrun") run<Fault::kGlobalOverrun>(total, stream);
+  if (fault == "overflow") run<Fault::kOverflow>(total, stream);
   int result = 0;
   cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
   cudaStreamSynchronize(stream);
   cudaFree(memory);
   cudaStreamDestroy(stream);
-  std::printf("%d\n", result);
+  std::printf("went on to the end: %d\n", result);
   return 0;
 }

@@ -53,6 +53,24 @@ inline Scene debris(Precision precision) {
   return scene;
 }
 
+// A block for each particle, and just more of them than fill a hash table of 1024 places half.
+inline Scene dust(Precision precision) {
+  Scene scene = debris(precision);
+  for (BodyParameters& body : scene.bodies) {
+    body.particles = 264;
+    body.semi_axes = {3000e3, 3000e3, 3000e3};
+    body.spin = {};
+  }
+  scene.bodies[1].first_id = 264;
+  return scene;
+}
+
+// Both bodies cross the planes between ranks, which lie across x.
+inline Scene drifting(Scene scene) {
+  for (BodyParameters& body : scene.bodies) body.velocity.x += 600.0;
+  return scene;
+}
+
 inline EngineSetup setup_for(const Scene& scene) {
   EngineSetup setup;
   setup.cell = scene.cell;

@@ -1,74 +1,29 @@
 // Parts of the particle mesh on the emulated device, on one rank and several.
 #include <gtest/gtest.h>
 
-#include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "cuda/body_sets.hpp"
-#include "cuda/box_gravity.hpp"
-#include "gravity/mesh/tree_pm.hpp"
+#include "tests/cuda/mesh_cases.hpp"
 
 namespace breccia::cuda {
 namespace {
 
-class DeviceStream {
- public:
-  DeviceStream() { check(cudaStreamCreate(&stream_), "stream"); }
-  ~DeviceStream() { (void)cudaStreamDestroy(stream_); }
-  DeviceStream(const DeviceStream&) = delete;
-  DeviceStream& operator=(const DeviceStream&) = delete;
-  operator cudaStream_t() const { return stream_; }  // NOLINT(google-explicit-constructor)
-
- private:
-  cudaStream_t stream_ = nullptr;
-};
-
-double pattern(std::size_t n) { return 1.0 + std::sin(0.7 * static_cast<double>(n * n % 1013)); }
-
-// Of planes dealt out to the ranks, with transpositions between them, and of all on one: the host's convolution.
-// Rounding of a transform grows as the logarithm of its length: some 1e-15 of the largest value.
 TEST(DeviceConvolutionTest, PotentialIsHosts) {
   const mpi::Comm world;
-  const DeviceStream stream;
-  const gravity::MeshSize size{{24, 27, 25}, {42, 48, 44}};
-  const gravity::Kernel kernel = gravity::mesh_kernel({.scale = 0.8, .cutoff = 3.6, .softening = 0.1});
-  const std::size_t plane = 27 * 25;
-  std::vector<double> expected(24 * plane);
-  for (std::size_t n = 0; n < expected.size(); ++n) expected[n] = pattern(n);
-  const std::vector<double> masses = expected;
-  gravity::Convolution<double>(size, kernel, mpi::Comm(MPI_COMM_SELF), 1).apply(expected.data());
+  expect_potential_is_hosts<double>(world);
+  expect_potential_is_hosts<float>(world);
+}
 
-  DeviceConvolution<double> convolution(size, kernel, world, stream);
-  const MeshPlanes<double> to = convolution.masses();
-  std::vector<double> own(to.size(), 0.0);
-  for (int i = to.begin; i < to.end; ++i) {
-    for (int j = 0; j < 27; ++j) {
-      for (int k = 0; k < 25; ++k)
-        own[to.at(i, j, k)] = masses[static_cast<std::size_t>(i * 27 + j) * 25 + static_cast<std::size_t>(k)];
-    }
-  }
-  check(cudaMemcpyAsync(to.values, own.data(), own.size() * sizeof(double), cudaMemcpyHostToDevice, stream), "masses");
-  convolution.apply();
-  const MeshPlanes<const double> from = convolution.potential();
-  std::vector<double> found(from.size());
-  check(cudaMemcpyAsync(found.data(), from.values, found.size() * sizeof(double), cudaMemcpyDeviceToHost, stream), "");
-  check(cudaStreamSynchronize(stream), "potential");
-  const double largest = std::abs(*std::min_element(expected.begin(), expected.end()));
-  for (int i = 0; i < 24; ++i) {
-    for (int j = 0; j < 27; ++j) {
-      for (int k = 0; k < 25; ++k) {
-        const std::size_t n = static_cast<std::size_t>(i * 27 + j) * 25 + static_cast<std::size_t>(k);
-        ASSERT_NEAR(found[from.at(i, j, k)], expected[n], 1e-14 * largest) << i << " " << j << " " << k;
-      }
-    }
-  }
-  EXPECT_EQ(convolution.bytes_sent() > 0.0, world.size() > 1);
+TEST(BoxGravityTest, FieldIsHostsForEveryDegreeOfTheLaw) {
+  const mpi::Comm world;
+  expect_box_is_hosts<double>(world);
+  expect_box_is_hosts<float>(world);
 }
 
 // Bodies inside two boxes and outside of both come out by set, in their order, none lost.
 TEST(BodySetsTest, BodiesAreDealtOut) {
-  const DeviceStream stream;
+  const Stream stream;
   constexpr unsigned n = 1000;
   std::vector<double> values(4 * n);
   for (std::size_t i = 0; i < 4 * n; ++i) values[i] = pattern(i);

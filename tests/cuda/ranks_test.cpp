@@ -10,12 +10,6 @@
 namespace breccia::cuda {
 namespace {
 
-// Both bodies cross the planes between ranks, which lie across x.
-Scene drifting(Scene scene) {
-  for (BodyParameters& body : scene.bodies) body.velocity.x += 600.0;
-  return scene;
-}
-
 class CudaRanks : public testing::TestWithParam<Precision> {
  protected:
   void SetUp() override { cuda_emulation::set_order(Order::kForward); }
@@ -112,6 +106,38 @@ TEST_P(CudaRanks, StepWaitsOnceForTheExchange) {
   }
   EXPECT_LE(cuda_emulation::launch_count() - launches, 25U);
   EXPECT_EQ(cuda_emulation::synchronisation_count() - waits, 5U);
+}
+
+// What is asked of each device for the particles of its rank is what they take: in sortings after which some are
+// another's, and at outputs.
+TEST_P(CudaRanks, MemoryIsKnownBefore) {
+  bool passed = false;
+  for (Scene scene : {small_impact(GetParam()), dust(GetParam())}) {
+    for (BodyParameters& body : scene.bodies) body.velocity.x += 3000.0;  // almost a cell between two sortings
+    EngineSetup setup = setup_for(scene);
+    const auto device = make_cuda_engine(setup, world_);
+    setup.divide_blocks = false;
+    const auto host = grid::make_host_engine(setup, world_);
+    fill(*host, scene, world_);
+    const auto needed = [&](const Engine& engine) {
+      const OwnPlanes planes = planes_of_rank(engine.slabs(), world_.rank());
+      return bytes_asked(setup, count_load(engine.save(), engine.flaws().threshold.size(), {}, true, planes));
+    };
+    const std::uint64_t before = needed(*host);
+    cuda_emulation::forget_most_bytes();
+    fill(*device, scene, world_);
+    const std::set<std::uint64_t> own = ids(*device);
+    advance(*device, 21, kStep);
+    device->gather(kStep);
+    device->sort();
+    passed = passed || world_.any(ids(*device) != own);
+    const std::uint64_t after = needed(*device);
+    device->scatter(0.5 * kStep);
+    device->update_grid(kStep);
+    (void)device->observe();
+    EXPECT_LE(cuda_emulation::most_bytes(), std::max(before, after) + 4096);
+  }
+  EXPECT_TRUE(passed);
 }
 
 // Particles that pass from rank to rank leave no flaws behind for ever: memory stays.

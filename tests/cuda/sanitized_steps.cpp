@@ -1,6 +1,7 @@
 // A few steps of a small scene, a sorting included, through the engine on the emulated device: built with a sanitizer,
 // as racecheck (every lane is a thread to it) or memcheck of every kernel. Racecheck is slow: an argument ("steps",
-// "gravity" or "mesh") asks for one part, briefly, so that the parts run side by side.
+// "gravity", "mesh" or "ranks") asks for one part, briefly, so that the parts run side by side. On several ranks the
+// clumps go from one to the next along a wall, and all share a mesh.
 #include <algorithm>
 #include <cstdio>
 #include <string_view>
@@ -10,12 +11,14 @@
 #include "cuda/box_gravity.hpp"
 #include "cuda/cuda_engine.hpp"
 #include "cuda/device_census.hpp"
+#include "cuda/stream.hpp"
 
 namespace {
 
 using namespace breccia;
 
 constexpr int kClump = 150;  // the first particles
+constexpr double kStep = 0.02;
 
 // Three clumps that share tiles, and particles that share nothing.
 ParticleArrays particles(double cell) {
@@ -87,6 +90,23 @@ void sum_in_box(const ParticleArrays& all) {
   cuda::check(cudaStreamDestroy(stream), "stream");
 }
 
+// A mesh is shared by ranks where it is large; this one, which they share all the same, is small.
+template <class Real>
+void share_mesh(const mpi::Comm& comm) {
+  const cuda::Stream stream;
+  cuda::DeviceConvolution<Real> convolution({{8, 6, 7}, {16, 12, 14}},
+                                            gravity::mesh_kernel({.scale = 0.8, .cutoff = 3.6}), comm, stream);
+  const cuda::MeshPlanes<Real> masses = convolution.masses();
+  cuda::check(cudaMemsetAsync(masses.values, 0, masses.size() * sizeof(Real), stream), "masses");
+  convolution.apply();
+  Real potential = 0;
+  cuda::check(
+      cudaMemcpyAsync(&potential, convolution.potential().values, sizeof potential, cudaMemcpyDeviceToHost, stream),
+      "potential");
+  cuda::check(cudaStreamSynchronize(stream), "potential");
+  std::printf("a potential of %g\n", static_cast<double>(potential));
+}
+
 grid::EngineSetup setup_for(Precision precision) {
   grid::EngineSetup setup;
   setup.cell = 1000.0;
@@ -115,22 +135,53 @@ void attract(cuda::CudaEngine<P>& engine, Precision precision) {
 
 template <class P>
 void advance(cuda::CudaEngine<P>& engine, int sortings) {
-  constexpr double step = 0.02;
-  engine.scatter(0.5 * step);
+  engine.scatter(0.5 * kStep);
   for (int n = 0; n < sortings; ++n) {
-    engine.update_grid(step);
-    engine.gather_scatter(step);
-    engine.update_grid(step);
-    engine.gather(step);
+    engine.update_grid(kStep);
+    engine.gather_scatter(kStep);
+    engine.update_grid(kStep);
+    engine.gather(kStep);
     engine.finish_damage();
     engine.sort();
-    engine.scatter(0.5 * step);
+    engine.scatter(0.5 * kStep);
   }
-  engine.update_grid(step);
+  engine.update_grid(kStep);
   std::printf("%zu particles, %llu tiles, %llu alone, fastest %g m/s, work %g J\n", engine.observe().size(),
               static_cast<unsigned long long>(engine.stats().tiles),
               static_cast<unsigned long long>(engine.stats().lone_particles), engine.signal_speeds().particle,
               engine.passes().plastic_work);
+}
+
+// A clump on the border of two ranks, and half a cell later.
+ParticleArrays drifting_share(double cell, const mpi::Comm& comm) {
+  const ParticleArrays all = particles(cell);
+  ParticleArrays share;
+  for (std::size_t i = 0; i < kClump; ++i) {
+    if (static_cast<int>(i) % comm.size() != comm.rank()) continue;
+    share.id.push_back(all.id[i]);
+    share.position.push_back(all.position[i] - Vec3d{1.5 * cell, 0.0, 0.0});
+    share.velocity.push_back(all.velocity[i] + Vec3d{0.25 * cell / kStep, 0.0, 0.0});
+    share.mass.push_back(all.mass[i]);
+    share.body.push_back(0);
+    share.material.push_back(0);
+    share.damage.push_back(0.0);
+  }
+  return share;
+}
+
+// False if there was nothing to send.
+template <class P>
+bool run_on_ranks(Precision precision, const mpi::Comm& comm) {
+  grid::EngineSetup setup = setup_for(precision);
+  setup.slab_axis = 0;
+  setup.boundaries = {{{0.0, 0.0, 0.0}, {0.0, 0.0, 1.0}, BoundaryKind::kSlip, 0.0}};
+  cuda::CudaEngine<P> engine(setup, comm);
+  fill(engine, drifting_share(setup.cell, comm));
+  const std::size_t before = engine.stats().particles;
+  advance(engine, 1);
+  engine.kick_velocities(kStep);
+  share_mesh<typename P::Real>(comm);
+  return comm.any(engine.stats().particles != before) && engine.stats().halo_bytes_per_step > 0;
 }
 
 template <class P>
@@ -151,9 +202,17 @@ int main(int count, char** arguments) {
   const breccia::mpi::Environment environment(&count, &arguments);
   breccia::cuda_emulation::set_order(breccia::cuda_emulation::Order::kRandom, 1);
   const std::string_view part = count > 1 ? arguments[1] : "";
-  if (!part.empty() && part != "steps" && part != "gravity" && part != "mesh") return 2;
-  run<breccia::MixedPrecision>(breccia::Precision::kMixed, part, part.empty() ? 3 : 1);
+  if (!part.empty() && part != "steps" && part != "gravity" && part != "mesh" && part != "ranks") return 2;
+  const breccia::mpi::Comm world;
   // Both precisions are the same source.
-  if (part.empty()) run<breccia::DoublePrecision>(breccia::Precision::kDouble, part, 3);
+  const bool both = part.empty();
+  using breccia::Precision;
+  if (world.size() > 1) {
+    bool sent = run_on_ranks<breccia::MixedPrecision>(Precision::kMixed, world);
+    if (both) sent = run_on_ranks<breccia::DoublePrecision>(Precision::kDouble, world) && sent;
+    return sent ? 0 : 1;
+  }
+  run<breccia::MixedPrecision>(Precision::kMixed, part, both ? 3 : 1);
+  if (both) run<breccia::DoublePrecision>(Precision::kDouble, part, 3);
   return 0;
 }

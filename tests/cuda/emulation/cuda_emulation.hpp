@@ -38,6 +38,8 @@ void set_order(Order order, std::uint64_t seed = 1);
 std::uint64_t launch_count();
 /// Calls that made the host wait for the device.
 std::uint64_t synchronisation_count();
+/// Calls that made or freed memory of a device, or pinned memory of the host: each may wait for the device.
+std::uint64_t allocation_count();
 /// Copied from device to host so far.
 std::uint64_t bytes_to_host();
 /// Most device memory in use at a time since it was last forgotten [bytes].
@@ -55,6 +57,7 @@ void use_only(const void* memory, std::size_t bytes);
 struct Substitute {
   std::vector<std::size_t> parameter_bytes;
   void (*run)(const std::byte* parameters);
+  mutable std::uint64_t launches = 0;
 };
 using Substitutes = std::map<std::string, Substitute>;
 /// From now on these run in place of the kernels of their names; a launch of another one is an error. Null: the kernels

@@ -31,11 +31,16 @@ void run_kernel(const std::string& kernel, dim3 grid, dim3 block, std::size_t sh
 
 namespace {
 
-// BRECCIA_EMULATED_MEMORY: bytes of the device.
-std::size_t device_bytes() {
-  const char* wanted = std::getenv("BRECCIA_EMULATED_MEMORY");
-  return wanted == nullptr ? std::size_t{2} << 30 : std::strtoull(wanted, nullptr, 10);
+// What the environment says of the device, or what one like an H100 has.
+std::size_t property(const char* variable, std::size_t usual) {
+  const char* wanted = std::getenv(variable);
+  return wanted == nullptr ? usual : std::strtoull(wanted, nullptr, 10);
 }
+std::size_t device_bytes() { return property("BRECCIA_EMULATED_MEMORY", std::size_t{2} << 30); }
+// For a thread block.
+int shared_memory_bytes() { return static_cast<int>(property("BRECCIA_EMULATED_SHARED", 232448)); }
+// 90 is 9.0.
+int capability() { return static_cast<int>(property("BRECCIA_EMULATED_CAPABILITY", 90)); }
 #if defined(__SANITIZE_ADDRESS__)
 constexpr std::size_t kGuard = 0;  // the sanitizer sees every access beyond the end
 void forbid(const unsigned char* start, std::size_t bytes) { __asan_poison_memory_region(start, bytes); }
@@ -80,6 +85,7 @@ Memory& memory() {
 std::uint64_t launches = 0;
 const Substitutes* substitutes = nullptr;
 std::uint64_t synchronisations = 0;
+std::uint64_t allocation_calls = 0;
 std::uint64_t copied_to_host = 0;
 
 int device_of_this = 0;
@@ -95,6 +101,7 @@ void enqueue(cudaStream_t stream, std::function<void()> work) { stream->enqueue(
 
 std::uint64_t launch_count() { return launches; }
 std::uint64_t synchronisation_count() { return synchronisations; }
+std::uint64_t allocation_count() { return allocation_calls; }
 std::uint64_t bytes_to_host() { return copied_to_host; }
 std::size_t most_bytes() { return memory().most; }
 void forget_most_bytes() { memory().most = memory().used; }
@@ -123,6 +130,7 @@ const Substitute* substitute_for(const std::string& kernel, const std::vector<st
   if (found == substitutes->end()) throw EmulationError(kernel + " has no translation");
   if (found->second.parameter_bytes != parameter_bytes)
     throw EmulationError(kernel + ": its parameters have other sizes where it was translated");
+  ++found->second.launches;
   return &found->second;
 }
 
@@ -170,6 +178,8 @@ const char* cudaGetErrorString(cudaError_t error) {
       return "CUDA driver version is insufficient for CUDA runtime version";
     case cudaErrorNoDevice:
       return "no CUDA-capable device is detected";
+    case cudaErrorNoKernelImageForDevice:
+      return "no kernel image is available for execution on the device";
     case cudaErrorNotReady:
       return "device not ready";
   }
@@ -190,8 +200,19 @@ cudaError_t cudaGetDevice(int* device) {
   return cudaSuccess;
 }
 cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
-  *properties = {"emulated device", breccia::cuda_emulation::device_bytes(), 9, 0, 0, device, 0};
+  using namespace breccia::cuda_emulation;
+  *properties = {"emulated device", device_bytes(), capability() / 10, capability() % 10, 0, device, 0};
   return cudaSuccess;
+}
+cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr, int) {
+  *value = breccia::cuda_emulation::shared_memory_bytes();
+  return cudaSuccess;
+}
+// The kernels are there for 8.0 and what comes.
+cudaError_t emulatedFuncSetAttribute(cudaFuncAttribute, int value) {
+  using namespace breccia::cuda_emulation;
+  if (capability() < 80) return cudaErrorNoKernelImageForDevice;
+  return value <= shared_memory_bytes() ? cudaSuccess : cudaErrorInvalidValue;
 }
 cudaError_t cudaMemGetInfo(std::size_t* available, std::size_t* total) {
   *total = breccia::cuda_emulation::device_bytes();
@@ -201,6 +222,7 @@ cudaError_t cudaMemGetInfo(std::size_t* available, std::size_t* total) {
 
 cudaError_t cudaMalloc(void** address, std::size_t bytes) {
   using namespace breccia::cuda_emulation;
+  ++allocation_calls;
   if (memory().used + bytes > device_bytes()) return cudaErrorMemoryAllocation;
   auto* start = static_cast<unsigned char*>(std::malloc(bytes + 2 * kGuard));
   if (start == nullptr) return cudaErrorMemoryAllocation;
@@ -216,6 +238,7 @@ cudaError_t cudaMalloc(void** address, std::size_t bytes) {
 cudaError_t cudaFree(void* address) {
   using namespace breccia::cuda_emulation;
   if (address == nullptr) return cudaSuccess;
+  ++allocation_calls;
   run_all();  // as the runtime waits
   const auto found = memory().allocations.find(static_cast<unsigned char*>(address));
   if (found == memory().allocations.end()) return cudaErrorInvalidValue;
@@ -234,10 +257,12 @@ cudaError_t cudaFree(void* address) {
 }
 
 cudaError_t cudaMallocHost(void** address, std::size_t bytes) {
+  ++breccia::cuda_emulation::allocation_calls;
   *address = std::malloc(bytes);
   return *address != nullptr ? cudaSuccess : cudaErrorMemoryAllocation;
 }
 cudaError_t cudaFreeHost(void* address) {
+  ++breccia::cuda_emulation::allocation_calls;
   breccia::cuda_emulation::run_all();
   std::free(address);
   return cudaSuccess;

@@ -47,6 +47,16 @@ inline double real64(std::uint64_t bits) { return std::bit_cast<double>(bits); }
 /// The .ftz of an instruction.
 inline float flushed(float x) { return std::abs(x) < FLT_MIN ? std::copysign(0.0F, x) : x; }
 
+/// What a device may find where it is right to `units` in the last place only: as far off as the bits of x say.
+template <class T>
+T inexact(T x, int units) {
+  using Bits = std::conditional_t<sizeof(T) == 8, std::uint64_t, std::uint32_t>;
+  if (x == T(0) || !std::isfinite(x)) return x;
+  const auto bits = std::bit_cast<Bits>(x);
+  const auto any = static_cast<int>(static_cast<std::uint32_t>(bits) * 2654435761U >> 16);
+  return std::bit_cast<T>(static_cast<Bits>(bits + static_cast<Bits>(any % (2 * units + 1) - units)));
+}
+
 /// Integer arithmetic wraps around.
 template <class T, class Operation, class... Operands>
 T wrapping(Operation operation, Operands... operands) {

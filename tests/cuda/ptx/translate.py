@@ -27,6 +27,8 @@ COMPARE = {"eq": "==", "ne": "!=", "lt": "<", "le": "<=", "gt": ">", "ge": ">=",
 UNORDERED = {"equ": "!=", "neu": "==", "ltu": ">=", "leu": ">", "gtu": "<=", "geu": "<"}
 FUNCTIONS = {"min": "least", "max": "greatest", "sqrt": "std::sqrt", "abs": "std::abs", "fma": "std::fma", "rem": "remainder"}
 WHOLE = {"rzi": "std::trunc", "rni": "std::nearbyint", "rmi": "std::floor", "rpi": "std::ceil"}
+# What a device does not round to the nearest number, and by how many units in the last place it may be off.
+INEXACT = {"div.full.f32": 2, "rcp.approx.f32": 1, "sqrt.approx.f32": 1, "rsqrt.approx.f32": 2, "rsqrt.approx.f64": 1}
 BITS = {"brev": "reversed_bits", "clz": "leading_zeros", "popc": "set_bits"}
 
 
@@ -135,8 +137,9 @@ class Kernel:
         flushed = "ftz" in mods and kind == "f32"
         read = (lambda o: f"flushed({self.value(o, kind)})") if flushed else (lambda o: self.value(o, kind))
         values = [read(o) for o in operands[1:]]
+        units = INEXACT.get(f"{base}.{mods[0]}.{kind}")
         allowed = {"rn", "ftz", "lo", kind}
-        if not set(mods) <= allowed:
+        if not set(mods if units is None else mods[1:]) <= allowed:
             raise KeyError(".".join(mods))
         if base in INFIX:
             result = f"wrapping<{VALUE[kind]}>([](auto a, auto b) {{ return a {INFIX[base]} b; }}, {values[0]}, {values[1]})"
@@ -152,6 +155,8 @@ class Kernel:
             result = f"quotient({values[0]}, {values[1]})"
         elif base == "rcp":
             result = f"{VALUE[kind]}(1) / {values[0]}"
+        elif base == "rsqrt":
+            result = f"{VALUE[kind]}(1) / std::sqrt({values[0]})"
         elif base == "neg":
             result = f"negative({values[0]})"
         elif base == "not":
@@ -163,15 +168,9 @@ class Kernel:
             result = f"inserted({', '.join(values)})"
         else:
             raise KeyError(base)
+        if units is not None:
+            result = f"inexact({result}, {units})"
         return self.assign(operands[0], f"flushed({result})" if flushed else result)
-
-    def do_rsqrt(self, mods, operands, _):
-        # A device is right to two units in the last place, here it is to half of one.
-        if mods not in (["approx", "ftz", "f32"], ["approx", "f64"]):
-            raise KeyError(".".join(mods))
-        kind = mods[-1]
-        root = f"{VALUE[kind]}(1) / std::sqrt({self.value(operands[1], kind)})"
-        return self.assign(operands[0], f"flushed({root})" if kind == "f32" else root)
 
     def do_mul(self, mods, operands, _):
         if mods[0] not in ("wide", "hi"):
