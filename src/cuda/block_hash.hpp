@@ -17,7 +17,9 @@ struct BlockHash {
 
 #if defined(__CUDACC__) || defined(BRECCIA_CUDA_EMULATED)
 __device__ __forceinline__ unsigned first_slot(const BlockHash& table, grid::BlockKey key) {
-  return static_cast<unsigned>(key * 0x9E3779B97F4A7C15ULL >> 32) & table.mask;
+  // Of the product only the highest bits hang on x.
+  const grid::BlockKey product = key * 0x9E3779B97F4A7C15ULL;
+  return static_cast<unsigned>(product >> 32 ^ product >> 48) & table.mask;
 }
 
 /// Index of the block or kNoBlock. Not while others insert.

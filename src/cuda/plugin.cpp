@@ -14,16 +14,18 @@ namespace {
 // What the kernels are compiled for, and more (CMAKE_CUDA_ARCHITECTURES).
 constexpr int kLeastMajor = 8;
 
-// Why the engine cannot run on the current device. The precision is not known yet: what the smaller one takes.
-std::string why_unfit(const cudaDeviceProp& device) {
+// Why the engine cannot run on the current device.
+std::string why_unfit(const cudaDeviceProp& device, Precision precision) {
   if (device.major < kLeastMajor) {
     return "it has compute capability " + std::to_string(device.major) + "." + std::to_string(device.minor) +
            ", and the engine needs " + std::to_string(kLeastMajor) + ".0";
   }
-  return why_no_tile_pass<float>();
+  const bool mixed = precision == Precision::kMixed;
+  const std::string why_not = mixed ? why_no_tile_pass<float>() : why_no_tile_pass<double>();
+  return why_not.empty() || mixed ? why_not : why_not + " in double precision";
 }
 
-const char* select_device(int local_rank, std::string& name) {
+const char* select_device(int local_rank, Precision precision, std::string& name) {
   int count = 0;
   cudaError_t status = cudaGetDeviceCount(&count);
   if (status == cudaSuccess && count == 0) status = cudaErrorNoDevice;
@@ -36,7 +38,7 @@ const char* select_device(int local_rank, std::string& name) {
     return cudaGetErrorString(status);
   }
   static std::string unfit;  // for the caller to read
-  unfit = why_unfit(properties);
+  unfit = why_unfit(properties, precision);
   if (!unfit.empty()) {
     unfit = std::string(properties.name) + " cannot be used: " + unfit;
     return unfit.c_str();

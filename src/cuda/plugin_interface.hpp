@@ -14,8 +14,9 @@ struct DeviceMemory;
 struct PluginInterface {
   /// Of the program that the library was built with: classes are shared, so it must be the same.
   const char* version;
-  /// Why no device can be used, or null. `name` gets the device of this process, the `local_rank`-th on its node.
-  const char* (*select_device)(int local_rank, std::string& name);
+  /// Why no device can be used in this precision, or null. `name` gets the device of this process, the `local_rank`-th
+  /// on its node.
+  const char* (*select_device)(int local_rank, Precision precision, std::string& name);
   /// How many ranks use the selected device. Collective.
   int (*ranks_on_device)(const mpi::Comm& comm);
   /// How `wanted` lets devices of several ranks exchange sums, in words; empty on one rank. Collective. Throws

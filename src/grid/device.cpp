@@ -56,10 +56,10 @@ int rank_on_node(const mpi::Comm& comm) {
 }
 
 // The device of this process and why it has none.
-std::pair<std::string, std::string> select(int local_rank) {
+std::pair<std::string, std::string> select(int local_rank, Precision precision) {
   if (plugin().interface == nullptr) return {"", plugin().why_not};
   std::string name;
-  const char* why_not = plugin().interface->select_device(local_rank, name);
+  const char* why_not = plugin().interface->select_device(local_rank, precision, name);
   return {name, why_not == nullptr ? "" : why_not};
 }
 
@@ -78,9 +78,9 @@ std::unique_ptr<Engine> make_cuda_engine(const EngineSetup& setup, const mpi::Co
 
 }  // namespace
 
-EngineChoice choose_engine(Device wanted, const mpi::Comm& comm, DeviceMessages messages) {
+EngineChoice choose_engine(Device wanted, Precision precision, const mpi::Comm& comm, DeviceMessages messages) {
   if (wanted == Device::kHost) return {&make_host_engine, "host", "", "", ""};
-  auto [name, why_not] = select(rank_on_node(comm));
+  auto [name, why_not] = select(rank_on_node(comm), precision);
   if (!comm.any(!why_not.empty())) {
     return {&make_cuda_engine, "cuda", warning_of_sharing(comm), name,
             plugin().interface->describe_messages(messages, comm)};
@@ -99,7 +99,7 @@ bool device_memory(const cuda::DevicePlan& plan, cuda::DeviceMemory& memory) {
 }
 
 std::string describe_cuda() {
-  const auto [name, why_not] = select(0);
+  const auto [name, why_not] = select(0, Precision::kMixed);
   return why_not.empty() ? name : why_not;
 }
 

@@ -25,7 +25,8 @@ struct EngineChoice {
 
 /// The engine to use, the same on all ranks: that of this node's CUDA devices, if every rank can have one, for kAuto
 /// and kCuda. Collective. Throws UsageError if kCuda cannot be had, or on devices `messages`.
-EngineChoice choose_engine(Device wanted, const mpi::Comm& comm, DeviceMessages messages = DeviceMessages::kMpi);
+EngineChoice choose_engine(Device wanted, Precision precision, const mpi::Comm& comm,
+                           DeviceMessages messages = DeviceMessages::kMpi);
 
 /// What a run will take of CUDA devices (cuda/device_plan.hpp), whether there are any or not. False: this build has no
 /// CUDA engine that could tell.

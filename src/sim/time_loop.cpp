@@ -102,7 +102,10 @@ void TimeLoop::run(const Visit& at_time_step, const Visit& at_window_start) {
     if (timeline_ != nullptr) timeline_->begin_step();
     // Kick with the mean of two unequal steps: the leapfrog stays second order where dt changes.
     timers_("grid", [&] { engine_->update_grid(0.5 * (previous_dt_ + dt_)); });
-    if (!at_time_step(*this)) return check();
+    if (!at_time_step(*this)) {
+      check();
+      return;
+    }
     if (!one_step(at_window_start)) return;
   }
 }
@@ -131,10 +134,9 @@ void TimeLoop::count_step() {
 
 void TimeLoop::between_steps() {
   count_step();
-  check();
-  const grid::PassReport passes = engine_->passes();
+  const grid::PassReport passes = check();
   steps_since_sort_ = 0;
-  lost_ = lost_work();
+  lost_ = lost_with(passes);
   const double largest_move = comm_.max(passes.largest_move);
   timers_("damage", [&] { engine_->finish_damage(); });
   timers_("sort", [&] { lost_.periods += engine_->sort(); });
@@ -199,15 +201,15 @@ grid::PassReport TimeLoop::finish_steps() const {
   return timers_("checks", [&] { return engine_->passes(); });
 }
 
-void TimeLoop::check() {
+grid::PassReport TimeLoop::check() {
   const grid::PassReport passes = finish_steps();
   const auto steps_after = static_cast<std::uint64_t>(steps_since_sort_) - passes.fault_step;
   guard_.note(passes, step_ - steps_after, time_ - static_cast<double>(steps_after) * previous_dt_);
   guard_.check(*engine_);
+  return passes;
 }
 
-LostWork TimeLoop::lost_work() const {
-  const grid::PassReport passes = engine_->passes();
+LostWork TimeLoop::lost_with(const grid::PassReport& passes) const {
   return {lost_.plastic + passes.plastic_work, lost_.viscous + passes.viscous_work, lost_.clamped + passes.clamped,
           lost_.periods};
 }

@@ -47,7 +47,7 @@ class TimeLoop {
   [[nodiscard]] double dt() const { return dt_; }
   [[nodiscard]] const grid::Engine& engine() const { return *engine_; }
   [[nodiscard]] gravity::Solver* solver() const { return solver_.get(); }
-  [[nodiscard]] LostWork lost_work() const;
+  [[nodiscard]] LostWork lost_work() const { return lost_with(finish_steps()); }
   [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
   [[nodiscard]] const Guard& guard() const { return guard_; }
   [[nodiscard]] const BalanceState& balance() const { return balance_.state(); }
@@ -62,7 +62,8 @@ class TimeLoop {
   void make_solver(const ResolvedEffects& effects, int threads);
   void count_step();
   void between_steps();
-  void check();  // of the guard
+  grid::PassReport check();  // of the guard; what it was shown
+  [[nodiscard]] LostWork lost_with(const grid::PassReport& passes) const;
   void begin_window();
   void shorten_step();
   [[nodiscard]] double stable_step_now();

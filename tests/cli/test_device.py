@@ -156,7 +156,11 @@ class Device(CommandTest):
             self.assertEqual(self.run_scene("a", "--device", "cuda", steps=2).returncode, 0)
             for ranks in (1, 2):
                 process = self.run_scene("b", "--device", "cuda", "--set", "numerics.precision=double", ranks=ranks)
-                self.assert_fails(process, 2, "cannot run in this precision: it has 101376 bytes of shared memory")
+                self.assert_fails(process, 2, "it has 101376 bytes of shared memory for a thread block, and a tile takes ")
+                self.assertIn("in double precision; use --device host or auto", process.stderr)
+            process = self.run_scene("c", "--set", "numerics.precision=double", steps=2)
+            self.assertEqual(process.returncode, 0, process.stderr)
+            self.assertIn("device: host (emulated device cannot be used: it has 101376 bytes", process.stdout)
 
     def test_run_continues_on_the_other_device(self):
         with devices(EMULATED):

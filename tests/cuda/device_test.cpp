@@ -17,7 +17,7 @@ int steps() {
 class DeviceTest : public testing::TestWithParam<Precision> {
  protected:
   static std::unique_ptr<Engine> make_device_engine(const EngineSetup& setup) {
-    return grid::choose_engine(grid::Device::kCuda, self()).make(setup, self());
+    return grid::choose_engine(grid::Device::kCuda, setup.numerics.precision, self()).make(setup, self());
   }
   static void expect_equal(const Scene& scene, const material::RuntimeEffects& effects, double mixed = kMixed) {
     EngineSetup setup = setup_for(scene);

@@ -55,11 +55,11 @@ void expect_waits(std::uint64_t in_a_step, std::uint64_t between_windows, const 
   EXPECT_EQ(fewest, 0U);
 }
 
-// One rank: three times for the sums of the passes, twice for strays, for unbroken particles, the time step and four
+// One rank: for the sums of the passes, twice for strays, for unbroken particles, the time step and four
 // counts of the sorting.
 TEST(Waits, OfOneRank) {
   const mpi::Comm world;
-  if (world.size() == 1) expect_waits(0, 11, world);
+  if (world.size() == 1) expect_waits(0, 9, world);
 }
 
 // Several, of which no particle goes to another one: these, once for the exchange, for the places of all particles,
@@ -69,7 +69,7 @@ TEST(Waits, OfSeveralRanksByEitherWayOfMpi) {
   if (world.size() == 1) return;
   for (const char* direct : {"0", "1"}) {
     setenv("BRECCIA_CUDA_AWARE_MPI", direct, 1);
-    expect_waits(1, 23, world);
+    expect_waits(1, 21, world);
   }
   unsetenv("BRECCIA_CUDA_AWARE_MPI");
 }

@@ -20,7 +20,7 @@ class Threads : public testing::TestWithParam<const char*> {
     const Scene scene = load(text, {std::string("numerics.precision=") + GetParam()});
     const mpi::Comm world;
     const ParticleOutput one = state_after(100, scene, world);
-    for (const int threads : {2, 3}) {
+    for (const int threads : {2, 3, 8}) {
       const ParticleOutput many = state_after(100, scene, world, threads);
       EXPECT_TRUE(same_bits(many.id, one.id));
       EXPECT_TRUE(same_bits(many.position, one.position));
