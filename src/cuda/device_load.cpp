@@ -59,7 +59,7 @@ Load count_load(const EngineState& state, std::uint64_t flaws, const grid::Perio
     const std::int32_t plane = grid::component(there, planes.axis);
     return planes.low <= plane && plane < planes.high;
   };
-  occupancy.count_cubes();
+  occupancy.count_cubes(1);
   const auto is_alone = [&](std::uint32_t b) {
     const BlockCoord own = grid::block_coord(occupancy.blocks()[b].block);
     return occupancy.is_alone(b, periodicity) && grid::known_around(own, planes.axis, periodicity, is_known);

@@ -13,7 +13,7 @@ std::vector<char> HostEngine<P>::find_lone(Occupancy& occupancy) const {
   // What other ranks hold is not known here, unless they tell.
   const bool others_tell = setup_.numerics.reproducible && comm_.size() > 1;
   if (others_tell) tell_neighbours(occupancy);
-  occupancy.count_cubes();
+  occupancy.count_cubes(setup_.threads);
   const auto is_known = [&](BlockCoord block) {
     return others_tell || comm_.size() == 1 || known_around(block, slabs_.axis(), periodicity_, [&](BlockCoord there) {
              return own_planes(there) == kAllPlanes;

@@ -10,6 +10,42 @@
 #include "grid/sweep_board.hpp"
 
 namespace breccia::grid {
+namespace {
+
+// Particles without grid, of which threads take some at a time. They wait for nobody.
+template <class P>
+class LoneChunks {
+ public:
+  LoneChunks(const Kernels<P>& kernels, const PassArguments<P>& arguments, std::uint32_t packs)
+      : kernels_(kernels), arguments_(arguments), packs_(packs), reports_((packs + kPacks - 1) / kPacks) {}
+
+  /// False: none are left.
+  bool run_one() {
+    const std::size_t n = next_++;
+    if (n >= reports_.size()) return false;
+    const auto first = static_cast<std::uint32_t>(n) * kPacks;
+    kernels_.lone_pass(arguments_, first, std::min(first + kPacks, packs_), reports_[n]);
+    return true;
+  }
+  /// After so many tiles. Lone particles stream through memory, which two threads at once do slower than one: so they
+  /// are dealt in between tiles, which do not.
+  void run_some(std::uint32_t tiles) {
+    constexpr std::uint32_t kTiles = 16;
+    for (std::uint32_t n = kTiles / 2; n < tiles; n += kTiles) run_one();
+  }
+  [[nodiscard]] std::span<const TileReport> reports() const { return reports_; }
+
+ private:
+  static constexpr std::uint32_t kPacks = 16;
+
+  const Kernels<P>& kernels_;
+  const PassArguments<P>& arguments_;
+  std::uint32_t packs_;
+  std::vector<TileReport> reports_;
+  std::atomic<std::size_t> next_{0};
+};
+
+}  // namespace
 
 template <class P>
 void HostEngine<P>::run_work(SweepWork work, const SweepPlane& plane, const PassArguments<P>& arguments,
@@ -37,29 +73,20 @@ void HostEngine<P>::update_stack(const Tile& tile, const NodeArguments<P>& argum
 
 template <class P>
 void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArguments<P>* trailing) {
-  constexpr std::uint32_t kChunk = 16;
-  const auto lone_packs = static_cast<std::uint32_t>(lone_pull_.size());
   fault_ = {};
   std::vector<TileReport> reports(tiles_.size());
-  std::vector<TileReport> lone_reports((lone_packs + kChunk - 1) / kChunk);
-  std::atomic<std::size_t> next_lone{0};
-  // Particles without grid wait for nobody: they fill the time in which a thread finds nothing else.
-  const auto run_lone = [&] {
-    const std::size_t n = next_lone++;
-    if (n >= lone_reports.size()) return false;
-    const auto first = static_cast<std::uint32_t>(n) * kChunk;
-    kernels_.lone_pass(arguments, first, std::min(first + kChunk, lone_packs), lone_reports[n]);
-    return true;
-  };
+  LoneChunks<P> lone(kernels_, arguments, static_cast<std::uint32_t>(lone_pull_.size()));
   const auto run_part = [&](const SweepPart& part, SweepBoard& board) {
     for (;;) {
       if (const auto work = board.take(omp_get_thread_num())) {
-        run_work(*work, part.planes[work->plane], arguments, trailing, reports);
+        const SweepPlane& plane = part.planes[work->plane];
+        run_work(*work, plane, arguments, trailing, reports);
         board.finish(*work);
-        run_lone();
+        // Messages wait for the boundary.
+        if (&part == &sweep_.interior) lone.run_some(plane.last - plane.first);
       } else if (board.all_taken()) {
         return;
-      } else if (!run_lone()) {
+      } else if (!lone.run_one()) {
         progress(trailing);
         std::this_thread::yield();
       }
@@ -80,7 +107,7 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
       if (early) send_sums();
     }
     run_part(sweep_.interior, interior);
-    while (run_lone()) {
+    while (lone.run_one()) {
     }
   }
   note("boundary tiles", Timeline::Lane::kTiles, begin, boundary_done);
@@ -99,8 +126,8 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
     report_.clamped += r.clamped;
     strayed_packs_ += r.strayed;
   };
-  std::for_each(reports.begin(), reports.end(), book);
-  std::for_each(lone_reports.begin(), lone_reports.end(), book);
+  std::ranges::for_each(reports, book);
+  std::ranges::for_each(lone.reports(), book);
 }
 
 template class HostEngine<MixedPrecision>;

@@ -3,6 +3,7 @@
 #include <cstdlib>
 
 #include "breccia/error.hpp"
+#include "grid/shares.hpp"
 
 namespace breccia::grid {
 namespace {
@@ -47,16 +48,20 @@ void Occupancy::tell(const Occupant& occupant) {
   blocks_.push_back(occupant);
 }
 
-void Occupancy::count_cubes() {
-  cubes_.clear();
-  cubes_.reserve(blocks_.size());
-  in_cube_.clear();
-  for (const Occupant& o : blocks_) {
-    const BlockCoord b = block_coord(o.block);
-    const std::uint32_t cube = cubes_.insert(block_key({b.x >> 2, b.y >> 2, b.z >> 2}));
-    if (cube == in_cube_.size()) in_cube_.push_back(0);
-    ++in_cube_[cube];
-  }
+void Occupancy::count_cubes(int threads) {
+  cube_parts_.assign(static_cast<std::size_t>(threads), {});
+  for_each_share(cube_parts_.size(), [&](std::size_t n) {
+    CubePart& part = cube_parts_[n];
+    part.cubes.reserve(blocks_.size() / cube_parts_.size());
+    for (const Occupant& o : blocks_) {
+      const BlockCoord b = block_coord(o.block);
+      const BlockKey key = block_key({b.x >> 2, b.y >> 2, b.z >> 2});
+      if (part_of(key) != n) continue;
+      const std::uint32_t cube = part.cubes.insert(key);
+      if (cube == part.occupied.size()) part.occupied.push_back(0);
+      ++part.occupied[cube];
+    }
+  });
 }
 
 bool Occupancy::cubes_are_empty(BlockCoord block, const Periodicity& periodicity) const {
@@ -75,8 +80,10 @@ bool Occupancy::cubes_are_empty(BlockCoord block, const Periodicity& periodicity
   for (int i = 0; i < count[0]; ++i) {
     for (int j = 0; j < count[1]; ++j) {
       for (int k = 0; k < count[2]; ++k) {
-        const std::uint32_t cube = cubes_.find(block_key({along[0][i], along[1][j], along[2][k]}));
-        if (cube != kNoBlock) occupied += in_cube_[cube];
+        const BlockKey key = block_key({along[0][i], along[1][j], along[2][k]});
+        const CubePart& part = cube_parts_[part_of(key)];
+        const std::uint32_t cube = part.cubes.find(key);
+        if (cube != kNoBlock) occupied += part.occupied[cube];
         if (occupied > 1) return false;
       }
     }

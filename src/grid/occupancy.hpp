@@ -61,8 +61,8 @@ class Occupancy {
   void tell(const Occupant& occupant);
   /// Adds what `other` has counted; returns the places of its blocks here.
   std::vector<std::uint32_t> merge(const Occupancy& other);
-  /// To be called before is_alone, when all blocks are known.
-  void count_cubes();
+  /// To be called before is_alone, when all blocks are known; on so many threads.
+  void count_cubes(int threads);
   /// Whether the one particle of block `b` shares no node with another one, even after both have drifted one node.
   [[nodiscard]] bool is_alone(std::uint32_t b, const Periodicity& periodicity) const;
 
@@ -73,8 +73,13 @@ class Occupancy {
 
   BlockTable table_;
   std::vector<Occupant> blocks_;
-  BlockTable cubes_;                    // of 4 x 4 x 4 blocks
-  std::vector<std::uint32_t> in_cube_;  // occupied blocks
+  // Cubes of 4 x 4 x 4 blocks and how many of these are occupied; a cube's key says in which part it is.
+  struct CubePart {
+    BlockTable cubes;
+    std::vector<std::uint32_t> occupied;
+  };
+  [[nodiscard]] std::size_t part_of(BlockKey cube) const { return key_hash(cube, 32) % cube_parts_.size(); }
+  std::vector<CubePart> cube_parts_;
 };
 
 }  // namespace breccia::grid

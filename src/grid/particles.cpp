@@ -131,11 +131,16 @@ std::size_t rearrange(LargeArray<T>& packs, std::span<const std::uint32_t> sourc
   std::size_t beside = 0;
   if (count * (d.back + d.ahead + 1) > packs.size()) {
     // Particles that come from anywhere, of other ranks or without grid until now: a copy is less.
-    const LargeArray<T> before(packs);
-#pragma omp parallel for schedule(static) num_threads(threads)
-    for (std::size_t p = 0; p < after; ++p) {
-      gather_pack<P>(
-          lanes_of<P>(source, p), table, [&](std::size_t q) { return &before[q]; }, packs[p]);
+    LargeArray<T> before(packs.size());
+#pragma omp parallel num_threads(threads)
+    {
+#pragma omp for schedule(static)
+      for (std::size_t p = 0; p < packs.size(); ++p) before[p] = packs[p];
+#pragma omp for schedule(static)
+      for (std::size_t p = 0; p < after; ++p) {
+        gather_pack<P>(
+            lanes_of<P>(source, p), table, [&](std::size_t q) { return &before[q]; }, packs[p]);
+      }
     }
     beside = before.size() * sizeof(T);
   } else {

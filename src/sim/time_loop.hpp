@@ -47,7 +47,7 @@ class TimeLoop {
   [[nodiscard]] double dt() const { return dt_; }
   [[nodiscard]] const grid::Engine& engine() const { return *engine_; }
   [[nodiscard]] gravity::Solver* solver() const { return solver_.get(); }
-  [[nodiscard]] LostWork lost_work() const { return lost_with(finish_steps()); }
+  [[nodiscard]] LostWork lost_work() const { return lost_with(engine_->passes()); }
   [[nodiscard]] const GravityRecord& gravity_record() const { return gravity_record_; }
   [[nodiscard]] const Guard& guard() const { return guard_; }
   [[nodiscard]] const BalanceState& balance() const { return balance_.state(); }

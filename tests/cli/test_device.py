@@ -73,10 +73,10 @@ class Device(CommandTest):
     def test_steps_of_a_device_are_not_booked_as_output(self):
         with devices(EMULATED):
             # It ends inside a window: nothing but the output waits for the device.
-            self.assertEqual(self.run_scene("a", "--device", "cuda", steps=2).returncode, 0)
+            self.assertEqual(self.run_scene("a", "--device", "cuda", steps=30).returncode, 0)
         summary = self.summary("a")
         seconds = {stage["stage"]: stage["seconds"] for stage in summary["stages"]}
-        # Two emulated steps take a hundred times as long as a snapshot of so few particles.
+        # Thirty emulated steps take ten times as long as two snapshots of so few particles.
         self.assertGreater(seconds["checks"], seconds["output"])
         self.assertGreater(summary["wall_seconds"], seconds["checks"])
 

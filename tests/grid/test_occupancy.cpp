@@ -58,9 +58,9 @@ bool is_alone(std::span<const Node> nodes, std::size_t n, const Periodicity& per
   return true;
 }
 
-void compare(std::span<const Node> nodes, const Periodicity& periodicity, int& alone) {
+void compare(std::span<const Node> nodes, const Periodicity& periodicity, int& alone, int threads = 1) {
   Occupancy occupancy = occupancy_of(nodes);
-  occupancy.count_cubes();
+  occupancy.count_cubes(threads);
   for (std::size_t n = 0; n < nodes.size(); ++n) {
     const auto found = std::ranges::find(occupancy.blocks(), block_of(nodes[n]), &Occupant::block);
     const auto b = static_cast<std::uint32_t>(found - occupancy.blocks().begin());
@@ -77,7 +77,7 @@ TEST(Occupancy, FindsWhoIsAloneAsThePairsSay) {
   for (int round = 0; round < 30; ++round) {
     std::vector<Node> nodes = random_nodes(random, 150, 60);
     for (Node& node : nodes) node[0] -= 30;  // blocks with negative numbers, too
-    compare(nodes, {}, alone);
+    compare(nodes, {}, alone, 1 + round % 3);
     particles += 150;
   }
   // Enough of either kind.
