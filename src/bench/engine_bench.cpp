@@ -158,8 +158,8 @@ std::vector<Row> rows(const EngineBenchOptions& options) {
 void run_engine_bench(const EngineBenchOptions& options) {
   const std::vector<Row> table_rows = rows(options);
   const mpi::Comm comm;
-  const grid::EngineChoice engine =
-      grid::choose_engine(options.device == "cuda" ? grid::Device::kCuda : grid::Device::kHost, Precision::kMixed, comm);
+  const grid::EngineChoice engine = grid::choose_engine(
+      options.device == "cuda" ? grid::Device::kCuda : grid::Device::kHost, Precision::kMixed, comm);
   std::vector<int> cores = options.cores.empty() ? std::vector<int>{1, 2} : options.cores;
   if (engine.device != "host") cores = {1};
   nlohmann::ordered_json results = nlohmann::ordered_json::array();
@@ -189,20 +189,19 @@ void run_engine_bench(const EngineBenchOptions& options) {
                    in_percent(m.sections), m.bytes_per_particle,
                    row.reproducible ? fmt::format("  price {:.1f} % of wall time", price) : "");
         std::fflush(table);
-        results.push_back({{"case", row.state.name},
-                           {"precision", name_of(precision)},
-                           {"cores", threads * comm.size()},
-                           {"ranks", comm.size()},
-                           {"effects", row.name()},
-                           {"particle_steps_per_second",
-                            threads * comm.size() == 1 && engine.device == "host" ? m.rate : m.wall_rate},
-                           {"particle_steps_per_cpu_second", m.rate},
-                           {"particle_steps_per_wall_second", m.wall_rate},
-                           {"seconds_of_a_cycle",
-                            {{"passes", m.sections.passes},
-                             {"grid", m.sections.grid},
-                             {"sorting", m.sections.sorting}}},
-                           {"bytes_per_particle", m.bytes_per_particle}});
+        results.push_back(
+            {{"case", row.state.name},
+             {"precision", name_of(precision)},
+             {"cores", threads * comm.size()},
+             {"ranks", comm.size()},
+             {"effects", row.name()},
+             {"particle_steps_per_second",
+              threads * comm.size() == 1 && engine.device == "host" ? m.rate : m.wall_rate},
+             {"particle_steps_per_cpu_second", m.rate},
+             {"particle_steps_per_wall_second", m.wall_rate},
+             {"seconds_of_a_cycle",
+              {{"passes", m.sections.passes}, {"grid", m.sections.grid}, {"sorting", m.sections.sorting}}},
+             {"bytes_per_particle", m.bytes_per_particle}});
       }
     }
   }

@@ -115,7 +115,8 @@ class HostEngine final : public Engine {
     if (timeline_ != nullptr) timeline_->add(name, lane, begin, end);
   }
 
-  // Sorting and migration (host_engine_sort.cpp, _arrange, _migrate.cpp, _lone.cpp, _connect.cpp, _insert.cpp, _slabs.cpp).
+  // Sorting and migration (host_engine_sort.cpp, _arrange, _migrate.cpp, _lone.cpp, _connect.cpp, _insert.cpp,
+  // _slabs.cpp).
   void settle(std::span<const Placement> placements);
   template <class F>
   void settle_shares(std::span<const std::uint32_t> bounds, F&& for_each_placement);
@@ -160,7 +161,7 @@ class HostEngine final : public Engine {
   [[nodiscard]] std::vector<mpi::SharedNodes> nodes_of(const std::vector<std::vector<BlockRequest>>& requests) const;
   [[nodiscard]] std::vector<mpi::SharedNodes> velocity_halves_of(const std::vector<mpi::SharedNodes>& peers) const;
   [[nodiscard]] BlockCoord stored(BlockCoord block) const;  // as whose nodes those of a tile's block lie in memory
-  std::uint32_t insert_owned(BlockCoord stored_block);  // its index
+  std::uint32_t insert_owned(BlockCoord stored_block);      // its index
   void share_with_images();
   void sort_cells_by_id(std::span<std::uint32_t> source, CellCounts& ends) const;
   void compact_flaws();

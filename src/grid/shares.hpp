@@ -12,7 +12,8 @@ namespace breccia::grid {
 inline std::vector<std::uint32_t> even_shares(std::size_t count, int shares) {
   std::vector<std::uint32_t> bounds;
   for (int n = 0; n <= shares; ++n) {
-    bounds.push_back(static_cast<std::uint32_t>(count * static_cast<std::size_t>(n) / static_cast<std::size_t>(shares)));
+    bounds.push_back(
+        static_cast<std::uint32_t>(count * static_cast<std::size_t>(n) / static_cast<std::size_t>(shares)));
   }
   return bounds;
 }
@@ -21,7 +22,7 @@ inline std::vector<std::uint32_t> even_shares(std::size_t count, int shares) {
 template <class F>
 void for_each_share(std::size_t shares, F&& work) {
   std::vector<std::exception_ptr> thrown(shares);
-#pragma omp parallel for schedule(static, 1) num_threads(static_cast<int>(shares))
+#pragma omp parallel for schedule(static, 1) num_threads(static_cast <int>(shares))
   for (std::size_t n = 0; n < shares; ++n) {
     try {
       work(n);

@@ -71,9 +71,8 @@ void run(const Scene& scene, const RunOptions& options_in, const mpi::Comm& comm
   RunOptions options = options_in;
   if (options.out.empty()) options.out = default_folder(scene);
   const double end = options.until.value_or(scene.time.end);
-  const grid::EngineChoice engine =
-      grid::choose_engine(device_for(scene, options.device), scene.numerics.precision, comm,
-                          scene.parallel.device_messages);
+  const grid::EngineChoice engine = grid::choose_engine(device_for(scene, options.device), scene.numerics.precision,
+                                                        comm, scene.parallel.device_messages);
   Beginning beginning = begin(scene, options, end, comm);
   if (beginning.finished) return;
   std::optional<Restart>& restart = beginning.restart;

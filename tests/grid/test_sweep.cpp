@@ -172,9 +172,9 @@ TEST(Sweep, UpdatesNodesSoonAfterTheyWereUsed) {
     board.finish(*work);
   }
   const std::vector<std::pair<Kind, std::uint32_t>> expected{
-      {Kind::kPass, 0},   {Kind::kPass, 2},   {Kind::kPass, 1},   {Kind::kUpdate, 0}, {Kind::kUpdate, 1},
-      {Kind::kPass, 4},   {Kind::kPass, 3},   {Kind::kUpdate, 2}, {Kind::kUpdate, 3}, {Kind::kPass, 6},
-      {Kind::kPass, 5},   {Kind::kUpdate, 4}, {Kind::kUpdate, 5}, {Kind::kUpdate, 6}};
+      {Kind::kPass, 0}, {Kind::kPass, 2},   {Kind::kPass, 1},   {Kind::kUpdate, 0}, {Kind::kUpdate, 1},
+      {Kind::kPass, 4}, {Kind::kPass, 3},   {Kind::kUpdate, 2}, {Kind::kUpdate, 3}, {Kind::kPass, 6},
+      {Kind::kPass, 5}, {Kind::kUpdate, 4}, {Kind::kUpdate, 5}, {Kind::kUpdate, 6}};
   EXPECT_EQ(done, expected);
 }
 
