@@ -42,7 +42,7 @@ ParticleArrays particles_of(const GravityState& state) {
 DeviceField::DeviceField(const GravityState& state, Precision precision, const mpi::Comm& comm)
     : precision_(precision) {
   if (comm.size() > 1) throw UsageError("gravity --device cuda measures one rank");
-  const grid::EngineChoice choice = grid::choose_engine(grid::Device::kCuda, Precision::kMixed, comm);
+  const grid::EngineChoice choice = grid::choose_engine(grid::Device::kCuda, precision, comm);
   device_ = choice.reason;
   const Scene scene = bare_scene(state, precision);
   engine_ = sim::make_loaded_engine(scene, sim::resolve_effects(scene), particles_of(state), 1, comm, choice.make);

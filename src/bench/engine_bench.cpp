@@ -158,8 +158,9 @@ std::vector<Row> rows(const EngineBenchOptions& options) {
 void run_engine_bench(const EngineBenchOptions& options) {
   const std::vector<Row> table_rows = rows(options);
   const mpi::Comm comm;
-  const grid::EngineChoice engine = grid::choose_engine(
-      options.device == "cuda" ? grid::Device::kCuda : grid::Device::kHost, Precision::kMixed, comm);
+  const grid::EngineChoice engine =
+      grid::choose_engine(options.device == "cuda" ? grid::Device::kCuda : grid::Device::kHost,
+                          chosen_precisions(options.precision).front(), comm);
   std::vector<int> cores = options.cores.empty() ? std::vector<int>{1, 2} : options.cores;
   if (engine.device != "host") cores = {1};
   nlohmann::ordered_json results = nlohmann::ordered_json::array();

@@ -19,8 +19,9 @@ std::size_t BlockTable::slot(BlockKey key) const {
 
 void BlockTable::reserve(std::size_t blocks) {
   // At most half of the slots are taken.
-  const std::size_t slots = std::bit_ceil(2 * blocks);
+  const std::size_t slots = std::bit_ceil(2 * std::max<std::size_t>(1, blocks));
   if (slots > slots_.size()) grow(slots);
+  keys_.reserve(blocks);
 }
 
 void BlockTable::grow(std::size_t slots) {

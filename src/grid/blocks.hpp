@@ -10,7 +10,8 @@
 
 namespace breccia::grid {
 
-/// One of 2^bits places for a key. Fibonacci hashing: only the highest bits of the product hang on all of the key.
+/// One of 2^bits places for a key, of two at least. Fibonacci hashing: only the highest bits of the product hang on all
+/// of the key.
 constexpr std::size_t key_hash(BlockKey key, unsigned bits) { return key * 0x9E3779B97F4A7C15ULL >> (64 - bits); }
 
 /// Blocks of this rank in the order of their storage, found by key in constant time.

@@ -59,6 +59,9 @@ class CellCounts {
   [[nodiscard]] std::uint32_t& of(std::size_t tile, std::uint32_t cell, std::size_t share) {
     return of_cell_[(tile * kStackCells + cell) * shares_ + share];
   }
+  [[nodiscard]] std::uint32_t of(std::size_t tile, std::uint32_t cell, std::size_t share) const {
+    return of_cell_[(tile * kStackCells + cell) * shares_ + share];
+  }
   [[nodiscard]] std::uint32_t& alone(std::size_t share) { return alone_[share]; }
   [[nodiscard]] std::size_t bytes() const { return of_cell_.capacity() * sizeof(std::uint32_t); }
 

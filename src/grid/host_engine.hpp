@@ -2,6 +2,8 @@
 // written twice at once and sums are the same for any number of threads.
 #pragma once
 
+#include <algorithm>
+
 #include "grid/blocks.hpp"
 #include "grid/boundary.hpp"
 #include "grid/cell_counts.hpp"
@@ -163,7 +165,7 @@ class HostEngine final : public Engine {
   [[nodiscard]] BlockCoord stored(BlockCoord block) const;  // as whose nodes those of a tile's block lie in memory
   std::uint32_t insert_owned(BlockCoord stored_block);      // its index
   void share_with_images();
-  void sort_cells_by_id(std::span<std::uint32_t> source, CellCounts& ends) const;
+  void sort_cells_by_id(std::span<std::uint32_t> source, const CellCounts& ends) const;
   void compact_flaws();
   void switch_damage_off();
 

@@ -69,7 +69,7 @@ std::vector<std::uint32_t> HostEngine<P>::order_particles(const Occupancy& occup
   const std::vector<std::uint32_t> bounds = even_shares(store_.packs(), std::min(setup_.threads, kMostCounters));
   const std::size_t shares = bounds.size() - 1;
   CellCounts counts(stacks_.size(), shares);
-  for_each_share(shares, [&](std::size_t n) {
+  for_each_share(setup_.threads, shares, [&](std::size_t n) {
     std::uint32_t alone = 0;
     for_each_destination(bounds[n], bounds[n + 1], [&](std::size_t, const BlockCell& to) {
       const std::uint32_t t = tile_of_block[to.block];
@@ -82,7 +82,7 @@ std::vector<std::uint32_t> HostEngine<P>::order_particles(const Occupancy& occup
   std::vector<std::uint32_t> source((lone_.first_pack + packs_for(lone_.particles)) * kLanes, ParticleStore<P>::kEmpty);
   lone_stack_.resize(lone_.particles);
   lone_node_.resize(lone_.particles);
-  for_each_share(shares, [&](std::size_t n) {
+  for_each_share(setup_.threads, shares, [&](std::size_t n) {
     std::uint32_t alone = counts.alone(n);
     for_each_destination(bounds[n], bounds[n + 1], [&](std::size_t from, const BlockCell& to) {
       const CellInStack cell = in_stack(to);
@@ -129,7 +129,7 @@ void HostEngine<P>::lay_out_tiles(CellCounts& counts) {
 }
 
 template <class P>
-void HostEngine<P>::sort_cells_by_id(std::span<std::uint32_t> source, CellCounts& ends) const {
+void HostEngine<P>::sort_cells_by_id(std::span<std::uint32_t> source, const CellCounts& ends) const {
   // Else the order would tell from which rank a particle came.
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     std::size_t first = tiles_[t].first_pack * kLanes;

@@ -86,6 +86,7 @@ mpi::PlaneWork HostEngine<P>::work(std::span<const double> more) const {
 template <class P>
 std::vector<SweepTile> HostEngine<P>::sweep_tiles() const {
   std::vector<SweepTile> tiles;
+  tiles.reserve(tiles_.size());
   for (std::size_t t = 0; t < tiles_.size(); ++t) {
     const double cost = kWeights<P>.tile + kWeights<P>.pack * packs_for(tiles_[t].particles);
     tiles.push_back({stacks_[t], is_boundary_[t] != 0, cost});

@@ -106,10 +106,10 @@ void HostEngine<P>::settle_shares(std::span<const std::uint32_t> bounds, F&& for
   drop_sums();
   drop_velocities();
   std::vector<SettledShare> shares(bounds.size() - 1);
-  for_each_share(shares.size(), [&](std::size_t n) {
+  for_each_share(setup_.threads, shares.size(), [&](std::size_t n) {
     SettledShare& share = shares[n];
     share.leaving.resize(static_cast<std::size_t>(comm_.size()));
-    share.occupancy.reserve(occupied_blocks_ + lone_.particles);  // as after the last sorting
+    share.occupancy.reserve((occupied_blocks_ + lone_.particles) / shares.size());  // as after the last sorting
     for_each_placement(bounds[n], bounds[n + 1], [&](const Placement& p) {
       const int rank = comm_.size() == 1 ? 0 : owner(p);
       if (rank == comm_.rank()) {
@@ -129,6 +129,7 @@ void HostEngine<P>::settle_shares(std::span<const std::uint32_t> bounds, F&& for
     }
     take_records(comm_.alltoall(leaving), occupancy);
   }
+  shares.clear();
   arrange(occupancy);
   connect_tiles();
   report_ = {};
@@ -146,7 +147,7 @@ Occupancy HostEngine<P>::join_shares(std::span<SettledShare> shares, std::span<c
   for (std::size_t n = 0; n < shares.size(); ++n) {
     if (n != most) place[n] = all.merge(shares[n].occupancy);
   }
-  for_each_share(shares.size(), [&](std::size_t n) {
+  for_each_share(setup_.threads, shares.size(), [&](std::size_t n) {
     if (n == most) return;
     for_each_destination(bounds[n], bounds[n + 1], [&](std::size_t slot, BlockCell to) {
       to.block = place[n][to.block];

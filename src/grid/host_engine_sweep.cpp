@@ -30,7 +30,7 @@ class LoneChunks {
   /// After so many tiles. Lone particles stream through memory, which two threads at once do slower than one: so they
   /// are dealt in between tiles, which do not.
   void run_some(std::uint32_t tiles) {
-    constexpr std::uint32_t kTiles = 16;
+    constexpr std::uint32_t kTiles = 8;
     for (std::uint32_t n = kTiles / 2; n < tiles; n += kTiles) run_one();
   }
   [[nodiscard]] std::span<const TileReport> reports() const { return reports_; }
@@ -83,7 +83,8 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
         run_work(*work, plane, arguments, trailing, reports);
         board.finish(*work);
         // Messages wait for the boundary.
-        if (&part == &sweep_.interior) lone.run_some(plane.last - plane.first);
+        const bool interior = &part == &sweep_.interior;
+        if (interior && work->kind == SweepWork::Kind::kPass) lone.run_some(plane.last - plane.first);
       } else if (board.all_taken()) {
         return;
       } else if (!lone.run_one()) {
@@ -107,8 +108,7 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
       if (early) send_sums();
     }
     run_part(sweep_.interior, interior);
-    while (lone.run_one()) {
-    }
+    while (lone.run_one()) progress(trailing);
   }
   note("boundary tiles", Timeline::Lane::kTiles, begin, boundary_done);
   note("interior tiles", Timeline::Lane::kTiles, boundary_done, Timeline::Clock::now());

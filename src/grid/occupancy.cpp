@@ -1,5 +1,6 @@
 #include "grid/occupancy.hpp"
 
+#include <algorithm>
 #include <cstdlib>
 
 #include "breccia/error.hpp"
@@ -50,7 +51,7 @@ void Occupancy::tell(const Occupant& occupant) {
 
 void Occupancy::count_cubes(int threads) {
   cube_parts_.assign(static_cast<std::size_t>(threads), {});
-  for_each_share(cube_parts_.size(), [&](std::size_t n) {
+  for_each_share(threads, cube_parts_.size(), [&](std::size_t n) {
     CubePart& part = cube_parts_[n];
     part.cubes.reserve(blocks_.size() / cube_parts_.size());
     for (const Occupant& o : blocks_) {
@@ -65,6 +66,8 @@ void Occupancy::count_cubes(int threads) {
 }
 
 bool Occupancy::cubes_are_empty(BlockCoord block, const Periodicity& periodicity) const {
+  // A block beside itself is never alone.
+  if (std::ranges::find(periodicity.blocks, 1) != periodicity.blocks.end()) return false;
   // Along each axis the cubes of the block and of those beside it, the same ones once. Where a period makes the two
   // outer ones the same that cube counts twice: then the blocks themselves are looked at.
   std::int32_t along[3][3];

@@ -18,11 +18,12 @@ inline std::vector<std::uint32_t> even_shares(std::size_t count, int shares) {
   return bounds;
 }
 
-/// Calls work(n) for every share n, each on a thread of its own; what is thrown in the lowest share is thrown again.
+/// Calls work(n) for every share n, on so many threads: always all there are, as a smaller team would end the others.
+/// What is thrown in the lowest share is thrown again.
 template <class F>
-void for_each_share(std::size_t shares, F&& work) {
+void for_each_share(int threads, std::size_t shares, F&& work) {
   std::vector<std::exception_ptr> thrown(shares);
-#pragma omp parallel for schedule(static, 1) num_threads(static_cast <int>(shares))
+#pragma omp parallel for schedule(static, 1) num_threads(threads)
   for (std::size_t n = 0; n < shares; ++n) {
     try {
       work(n);

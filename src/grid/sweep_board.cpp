@@ -7,7 +7,16 @@ SweepBoard::SweepBoard(const SweepPart& part, bool updates)
       pass_(part.planes.size(), State::kOpen),
       update_(part.planes.size(), updates ? State::kOpen : State::kDone),
       lowest_(part.homes.begin(), part.homes.end() - 1),
-      open_(part.planes.size() * (updates ? 2 : 1)) {}
+      open_(updates ? part.planes.size() : 0) {
+  // Planes with nothing to pass over keep nobody waiting.
+  for (std::size_t plane = 0; plane < pass_.size(); ++plane) {
+    if (part.planes[plane].first == part.planes[plane].last) {
+      pass_[plane] = State::kDone;
+    } else {
+      ++open_;
+    }
+  }
+}
 
 bool SweepBoard::pass_ready(std::uint32_t plane) const {
   if (pass_[plane] != State::kOpen) return false;
@@ -56,11 +65,6 @@ std::optional<SweepWork> SweepBoard::take(int home) {
 void SweepBoard::finish(SweepWork work) {
   const std::scoped_lock lock(mutex_);
   (work.kind == SweepWork::Kind::kPass ? pass_ : update_)[work.plane] = State::kDone;
-}
-
-bool SweepBoard::all_taken() {
-  const std::scoped_lock lock(mutex_);
-  return open_ == 0;
 }
 
 }  // namespace breccia::grid

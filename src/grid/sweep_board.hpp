@@ -3,6 +3,7 @@
 // neighbours are passed over, while its nodes are still in the cache.
 #pragma once
 
+#include <atomic>
 #include <cstdint>
 #include <mutex>
 #include <optional>
@@ -29,7 +30,7 @@ class SweepBoard {
   /// To be called after the work is done that was taken.
   void finish(SweepWork work);
   /// Nothing is left for anybody to take.
-  [[nodiscard]] bool all_taken();
+  [[nodiscard]] bool all_taken() const { return open_ == 0; }
 
  private:
   enum class State : std::uint8_t { kOpen, kTaken, kDone };
@@ -44,7 +45,7 @@ class SweepBoard {
   std::vector<State> pass_;
   std::vector<State> update_;
   std::vector<std::uint32_t> lowest_;  // of each home, the first plane that may have something open
-  std::size_t open_;
+  std::atomic<std::size_t> open_;      // passes and updates that nobody has taken
 };
 
 }  // namespace breccia::grid

@@ -3,7 +3,7 @@
 // neighbours: that fixes the order of all sums whatever the number of threads.
 #include "grid/sweep_plan.hpp"
 
-#include <algorithm>
+#include <cmath>
 
 namespace breccia::grid {
 namespace {

@@ -57,6 +57,8 @@ TEST(BlockTable, TakesBlocksFarApartInAnyDirectionToOtherPlaces) {
 
 TEST(BlockTable, HoldsMoreThanThereWasRoomFor) {
   BlockTable table;
+  table.reserve(0);
+  EXPECT_EQ(table.find(block_key({1, 2, 3})), kNoBlock);
   table.reserve(10);
   for (std::int32_t n = 0; n < 5000; ++n) EXPECT_EQ(table.insert(block_key({n, 0, 0})), static_cast<std::uint32_t>(n));
   table.reserve(20000);

@@ -42,6 +42,7 @@ std::int32_t apart(std::int32_t a, std::int32_t b, std::int32_t period) {
 // By the definition, over all pairs: no particle in the same block; none in the blocks around it, unless it is one by
 // itself and so far away that stencils cannot meet after either has drifted a node.
 bool is_alone(std::span<const Node> nodes, std::size_t n, const Periodicity& periodicity) {
+  if (std::ranges::count(periodicity.blocks, 1) > 0) return false;  // a block beside itself
   std::map<BlockKey, int> in_block;
   for (const Node& node : nodes) ++in_block[block_of(node)];
   for (std::size_t other = 0; other < nodes.size(); ++other) {
@@ -88,14 +89,25 @@ TEST(Occupancy, FindsWhoIsAloneAsThePairsSay) {
 TEST(Occupancy, FindsItAcrossTheEndsOfAPeriod) {
   std::mt19937 random(2);
   int alone = 0;
-  // Periods of which four blocks are no part, and so short that cubes at both ends are the same one; from three blocks
-  // on, as a block of fewer is its own neighbour.
-  for (const std::int32_t period : {3, 4, 5, 7, 9, 16}) {
+  // Periods of which four blocks are no part, and so short that cubes at both ends are the same one.
+  for (const std::int32_t period : {1, 2, 3, 4, 5, 7, 9, 16}) {
     for (int round = 0; round < 20; ++round) {
-      compare(random_nodes(random, 2 + static_cast<int>(random() % 20), 4 * period), {{period, period, period}}, alone);
+      const std::vector<Node> nodes = random_nodes(random, 2 + static_cast<int>(random() % 20), 4 * period);
+      compare(nodes, {{period, period, period}}, alone, 1 + round % 8);
     }
+    // Along one axis only.
+    std::vector<Node> nodes = random_nodes(random, 40, 160);
+    for (Node& node : nodes) node[1] %= 4 * period;
+    compare(nodes, {{0, period, 0}}, alone);
   }
   EXPECT_GT(alone, 100);
+}
+
+TEST(Occupancy, HasFewerBlocksThanThreads) {
+  // At the corner of a cube: all eight cubes around are looked at.
+  Occupancy occupancy = occupancy_of(std::vector<Node>{{0, 0, 0}});
+  occupancy.count_cubes(8);
+  EXPECT_TRUE(occupancy.is_alone(0, {}));
 }
 
 TEST(Occupancy, OfSharesIsThatOfAll) {
@@ -135,7 +147,7 @@ TEST(Shares, CoverAllAndHandOnWhatIsThrown) {
     if (n == 2) throw std::runtime_error("of share 2");
     if (n == 3) throw std::logic_error("of share 3");
   };
-  EXPECT_THROW(for_each_share(5, work), std::runtime_error);
+  EXPECT_THROW(for_each_share(3, 5, work), std::runtime_error);
   EXPECT_EQ(calls, std::vector<int>(5, 1));
 }
 

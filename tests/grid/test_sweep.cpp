@@ -3,8 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <array>
-#include <numeric>
+#include <optional>
 #include <random>
 
 #include "grid/sweep_board.hpp"
