@@ -77,6 +77,7 @@ class HostEngine final : public Engine {
   PassArguments<P> pass_arguments(double step, double half_step);
   NodeArguments<P> node_arguments(double kick);
   void run_pass(const PassArguments<P>& arguments, const NodeArguments<P>* trailing = nullptr);
+  void book(std::span<const TileReport> reports);
   void report_fault();
   void run_work(SweepWork work, const SweepPlane& plane, const PassArguments<P>& arguments,
                 const NodeArguments<P>* trailing, std::vector<TileReport>& reports);

@@ -119,15 +119,19 @@ void HostEngine<P>::run_pass(const PassArguments<P>& arguments, const NodeArgume
     report_.fault_step = gathers_;
   }
   gathers_ += arguments.gather ? 1 : 0;
-  const auto book = [&](const TileReport& r) {
+  book(reports);
+  book(lone.reports());
+}
+
+template <class P>
+void HostEngine<P>::book(std::span<const TileReport> reports) {
+  for (const TileReport& r : reports) {
     report_.plastic_work += r.plastic_work;
     report_.viscous_work += r.viscous_work;
     report_.largest_move = std::max(report_.largest_move, r.largest_move);
     report_.clamped += r.clamped;
     strayed_packs_ += r.strayed;
-  };
-  std::ranges::for_each(reports, book);
-  std::ranges::for_each(lone.reports(), book);
+  }
 }
 
 template class HostEngine<MixedPrecision>;
