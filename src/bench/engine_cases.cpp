@@ -12,9 +12,10 @@ namespace breccia::bench {
 namespace {
 
 constexpr EngineCase kCases[] = {
-    {"paper", 47324, 1.412, 0.0},           {"debris", 47324, 1.412, 0.25},  {"cell8_1e5", 50000, 8.0, 0.0},
-    {"cell8_1e4", 5000, 8.0, 0.0},          {"cell8_1e6", 500000, 8.0, 0.0}, {"cell8_1e7", 5000000, 8.0, 0.0},
-    {"broken_1e6", 500000, 8.0, 0.0, true},
+    {"paper", 47324, 1.412, 0.0},           {"debris", 47324, 1.412, 0.25},    {"cell8_1e5", 50000, 8.0, 0.0},
+    {"cell8_1e4", 5000, 8.0, 0.0},          {"cell8_1e6", 500000, 8.0, 0.0},   {"cell8_1e7", 5000000, 8.0, 0.0},
+    {"broken_1e6", 500000, 8.0, 0.0, true}, {"paper_1e6", 500000, 1.412, 0.0}, {"paper_3e6", 1500000, 1.412, 0.0},
+    {"debris_1e6", 500000, 1.412, 0.25},
 };
 
 constexpr EffectChoice kEffects[] = {

@@ -17,7 +17,9 @@ int measure(int argc, char** argv) {
   breccia::bench::EngineBenchOptions options;
   CLI::App* engine = app.add_subcommand("engine", "particle-steps per second of the engine");
   engine->add_flag("--quick", options.quick, "the paper's state with all effects only, half a minute");
-  engine->add_option("--case", options.cases, "paper, debris, cell8_1e4, cell8_1e5, cell8_1e6, cell8_1e7, broken_1e6");
+  engine->add_option("--case", options.cases,
+                     "paper, debris, cell8_1e4, cell8_1e5, cell8_1e6, cell8_1e7, broken_1e6, paper_1e6, paper_3e6, "
+                     "debris_1e6");
   engine->add_option("--effects", options.effects, "all, or one of those 'no ...'");
   engine->add_option("--precision", options.precision, "mixed or double")->check(CLI::IsMember({"mixed", "double"}));
   engine->add_option("--cores", options.cores, "numbers of threads")->check(CLI::PositiveNumber);

@@ -84,7 +84,8 @@ class HostEngine final : public Engine {
   void update_stack(const Tile& tile, const NodeArguments<P>& arguments);
 
   // Memory (host_engine_memory.cpp).
-  [[nodiscard]] bool has_few_nodes() const;  // beside particles
+  [[nodiscard]] bool has_few_nodes() const;   // beside particles
+  [[nodiscard]] bool outgrows_cache() const;  // so that nodes come from memory in every step
   [[nodiscard]] std::size_t places() const { return node_places_; }
   [[nodiscard]] std::uint32_t velocity_half(std::uint32_t place, std::uint32_t h) const {
     return kernels_.velocity_half(place, h, places());

@@ -9,8 +9,6 @@
 namespace breccia::grid {
 namespace {
 
-constexpr std::uint32_t kNoTile = kNoBlock;
-
 // More threads do not count faster, as their counts are to be added up.
 constexpr int kMostCounters = 4;
 

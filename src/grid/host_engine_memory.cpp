@@ -13,6 +13,14 @@ bool HostEngine<P>::has_few_nodes() const {
   return 8 * places() * kChannels * sizeof(Real) < store_.packs() * kLanes * store_.record_bytes();
 }
 
+template <class P>
+bool HostEngine<P>::outgrows_cache() const {
+  // Measured at 1.4 particles a cell (docs/performance.md): to ask for nodes costs 2 % below and gives up to 50 %
+  // beyond.
+  constexpr std::size_t kCache = std::size_t{64} << 20;
+  return 2 * places() * kChannels * sizeof(Real) + store_.packs() * kLanes * store_.record_bytes() > kCache;
+}
+
 // What the array held may be lost: its callers know that nobody reads it.
 template <class P>
 void HostEngine<P>::hold(LargeArray<Real>& values, std::size_t places) {

@@ -56,9 +56,11 @@ void HostEngine<P>::run_work(SweepWork work, const SweepPlane& plane, const Pass
     for (std::uint32_t t = plane.first_tile; t < plane.last_tile; ++t) update_stack(tiles_[t], *trailing);
     return;
   }
+  const bool asks_ahead = outgrows_cache();
   for (std::uint32_t n = plane.first; n < plane.last; ++n) {
     const std::uint32_t tile = sweep_.order[n];
-    kernels_.pass(arguments, tile, reports[tile]);
+    const bool asks = asks_ahead && n + 1 < plane.last;
+    kernels_.pass(arguments, tile, asks ? sweep_.order[n + 1] : kNoTile, reports[tile]);
     if (n % kStretch == 0) progress(trailing);
   }
 }

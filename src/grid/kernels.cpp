@@ -31,9 +31,9 @@ BRECCIA_HD void specialised(const material::RuntimeEffects& fx, F&& run) {
 }
 
 template <class P>
-void pass(const PassArguments<P>& a, std::uint32_t tile, TileReport& report) {
-  specialised(a.effects,
-              [&](const auto& fx) BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, sums_apart<P>(), tile, report); });
+void pass(const PassArguments<P>& a, std::uint32_t tile, std::uint32_t ahead, TileReport& report) {
+  specialised(a.effects, [&](const auto& fx)
+                             BRECCIA_INLINE_LAMBDA { pass_over_tile(a, fx, sums_apart<P>(), tile, ahead, report); });
 }
 
 template <class P>

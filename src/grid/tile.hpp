@@ -18,6 +18,8 @@ inline constexpr int kStackHeight = kStackBlocks * kBlockWidth;  ///< nodes of a
 inline constexpr int kStackCells = kStackBlocks * kBlockNodes;
 inline constexpr int kTileHeight = kStackHeight + 2 * kTileMargin;  ///< nodes of a tile along z; kTileWidth along x, y
 
+inline constexpr std::uint32_t kNoTile = kNoBlock;
+
 /// Lowest block of the stack that a block belongs to.
 constexpr BlockCoord stack_of(BlockCoord b) { return {b.x, b.y, b.z & ~(kStackBlocks - 1)}; }
 
@@ -230,7 +232,8 @@ struct NodeArguments {
 /// The entry points one instruction set provides.
 template <class P>
 struct Kernels {
-  void (*pass)(const PassArguments<P>&, std::uint32_t tile, TileReport&);
+  /// `ahead`: the tile that comes next, whose nodes are far; else kNoTile.
+  void (*pass)(const PassArguments<P>&, std::uint32_t tile, std::uint32_t ahead, TileReport&);
   void (*probe)(const ProbeArguments<P>&, std::uint32_t tile);
   /// The same for the lone packs first .. last-1, counted from 0.
   void (*lone_pass)(const PassArguments<P>&, std::uint32_t first, std::uint32_t last, TileReport&);

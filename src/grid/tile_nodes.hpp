@@ -43,13 +43,7 @@ struct TileNodes {
     }
   }
 
- private:
-  template <class F>
-  BRECCIA_HD static void for_each_column(const Tile& tile, F&& visit) {
-    for (int x = tile.starts.low[0]; x <= tile.starts.high[0] + 2; ++x) {
-      for (int y = tile.starts.low[1]; y <= tile.starts.high[1] + 2; ++y) visit(column_index(x, y), place(tile, x, y));
-    }
-  }
+  /// Of node z = 0 of a column of a tile that reaches it.
   BRECCIA_HD static std::size_t place(const Tile& tile, int x, int y) {
     constexpr int kBelow = kBlockWidth - kTileMargin;  // nodes of the block below that are no part of the tile
     const int in_x = x + kBelow;
@@ -57,6 +51,14 @@ struct TileNodes {
     const TileColumns& columns = tile.columns[in_x / kBlockWidth * 3 + in_y / kBlockWidth];
     const int n = in_x % kBlockWidth * kBlockWidth + in_y % kBlockWidth;
     return columns.first + static_cast<std::size_t>(n) * columns.height;
+  }
+
+ private:
+  template <class F>
+  BRECCIA_HD static void for_each_column(const Tile& tile, F&& visit) {
+    for (int x = tile.starts.low[0]; x <= tile.starts.high[0] + 2; ++x) {
+      for (int y = tile.starts.low[1]; y <= tile.starts.high[1] + 2; ++y) visit(column_index(x, y), place(tile, x, y));
+    }
   }
 };
 

@@ -1,6 +1,7 @@
 // The pass over one tile: G2P and P2G on the nodes of the blocks around it.
 #pragma once
 
+#include "grid/nodes_ahead.hpp"
 #include "grid/pack_pass.hpp"
 #include "grid/tile_nodes.hpp"
 #include "grid/transfer.hpp"
@@ -77,13 +78,15 @@ class TileGrid {
 
 template <class P, class Fx>
 BRECCIA_HD void pass_over_tile(const PassArguments<P>& a, const Fx& fx, typename P::Real* sums_apart,
-                               std::uint32_t index, TileReport& report) {
+                               std::uint32_t index, std::uint32_t ahead, TileReport& report) {
   TileGrid<P> grid(a, index, sums_apart);
   PackPass<P, Fx, TileGrid<P>> packs(a, fx, grid);
   const Tile& tile = a.tiles[index];
+  NodesAhead<P> nodes_ahead(a, tile, ahead);
   for (int done = 0; done < static_cast<int>(tile.particles); done += P::kLanes) {
     const int left = static_cast<int>(tile.particles) - done;
     const int pack = done / P::kLanes;
+    nodes_ahead.ask(pack);
     packs.run(tile.first_pack + static_cast<std::size_t>(pack), left < P::kLanes ? left : P::kLanes, report);
   }
   grid.finish(report);

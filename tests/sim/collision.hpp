@@ -41,6 +41,20 @@ spin = [0, "0.02 rad/s", 0]
 )";
 }
 
+/// Particles that share only their outermost nodes: of 64,000 particles a million nodes, 64 bytes each in mixed
+/// precision.
+inline std::string many_nodes() {
+  return scene_of(1e3, 0.05) + R"([[body]]
+shape = "box"
+lattice = "cubic"
+spacing = "2.5 km"
+size = ["100 km", "100 km", "100 km"]
+spin = [0, "0.01 rad/s", "0.02 rad/s"]
+[effects]
+gravity = "off"
+)";
+}
+
 /// Spheres of 100 km that meet at 200 m/s and 15 degrees, 6 km before contact: forces start at a gap of a cell. The
 /// step is the same part of a cell as in the flagship run.
 inline std::string collision(double cell) {

@@ -15,13 +15,16 @@ bool same_bits(const std::vector<T>& a, const std::vector<T>& b) {
 
 class Threads : public testing::TestWithParam<const char*> {
  protected:
+  [[nodiscard]] Scene load_scene(const std::string& text) const {
+    return load(text, {std::string("numerics.precision=") + GetParam()});
+  }
   // 100 steps: damage, contact, several sortings and gravity windows.
-  void expect_same(const std::string& text) const {
-    const Scene scene = load(text, {std::string("numerics.precision=") + GetParam()});
+  void expect_same(const std::string& text, std::uint64_t steps = 100) const {
+    const Scene scene = load_scene(text);
     const mpi::Comm world;
-    const ParticleOutput one = state_after(100, scene, world);
+    const ParticleOutput one = state_after(steps, scene, world);
     for (const int threads : {2, 3, 8}) {
-      const ParticleOutput many = state_after(100, scene, world, threads);
+      const ParticleOutput many = state_after(steps, scene, world, threads);
       EXPECT_TRUE(same_bits(many.id, one.id));
       EXPECT_TRUE(same_bits(many.position, one.position));
       EXPECT_TRUE(same_bits(many.velocity, one.velocity));
@@ -39,6 +42,14 @@ TEST_P(Threads, GiveTheSameOfWhatLeavesItsSlab) { expect_same(flying_body("8 km"
 TEST_P(Threads, GiveTheSameOnAPeriodicAxis) {
   for (const int blocks : {1, 3, 4}) expect_same(periodic_slide(blocks));
   for (const int blocks : {1, 5}) expect_same(periodic_slide(blocks, 2));
+}
+// Where nodes come from memory they are asked for ahead, of tiles that reach all around them and others that do not.
+TEST_P(Threads, GiveTheSameWhereNodesOutgrowTheCache) {
+  simulate(load_scene(many_nodes()), [](const TimeLoop& loop) {
+    EXPECT_GT(loop.engine().stats().grid_bytes, 64U << 20);  // as HostEngine::outgrows_cache
+    return false;
+  });
+  expect_same(many_nodes(), 4);
 }
 
 INSTANTIATE_TEST_SUITE_P(Precisions, Threads, testing::Values("mixed", "double"));
