@@ -23,7 +23,8 @@ struct EngineCase {
 inline constexpr double kDebrisRadius = 2.0e7;  ///< [m]
 
 /// paper: the paper's baseline. cell8_1e6: well filled cells; broken_1e6: the same with D = 1 everywhere. debris: after
-/// an impact. cell8_1e4, cell8_1e5 and cell8_1e7: whether the cost of a particle depends on their number.
+/// an impact. cell8_1e4, cell8_1e5, cell8_1e7, paper_1e6, paper_3e6 and debris_1e6: whether the cost of a particle
+/// depends on their number.
 std::span<const EngineCase> engine_cases();
 
 /// The effects of a measurement: all of them, or all but one.

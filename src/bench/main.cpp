@@ -1,6 +1,8 @@
 // breccia_bench: the measurements behind tools/bench.
 #include <CLI/CLI.hpp>
 #include <cstdio>
+#include <filesystem>
+#include <string>
 
 #include "bench/engine_bench.hpp"
 #include "bench/gravity_bench.hpp"
@@ -10,6 +12,18 @@
 #include "mpi/comm.hpp"
 
 namespace {
+
+// Asked before minutes of measurements, not after them.
+std::string require_folder(const std::string& file) {
+  const std::filesystem::path folder = std::filesystem::path(file).parent_path();
+  if (folder.empty() || std::filesystem::is_directory(folder)) return {};
+  return file + ": its folder does not exist";
+}
+
+void add_json(CLI::App& command, std::string& file) {
+  command.add_option("--json", file, "file for the results, - for standard output")
+      ->check(CLI::Validator(require_folder, "FILE"));
+}
 
 int measure(int argc, char** argv) {
   CLI::App app("Measures the speed of breccia on this machine");
@@ -26,7 +40,7 @@ int measure(int argc, char** argv) {
   engine->add_option("--device", options.device, "host or cuda")->check(CLI::IsMember({"host", "cuda"}));
   engine->add_option("--seconds", options.seconds, "least time of a measurement")->capture_default_str();
   engine->add_flag("--reproducible", options.reproducible, "each state also with numerics.reproducible: its price");
-  engine->add_option("--json", options.json, "file for the results, - for standard output");
+  add_json(*engine, options.json);
   breccia::bench::GravityBenchOptions gravity_options;
   CLI::App* gravity = app.add_subcommand("gravity", "time and error of self-gravity");
   gravity->add_flag("--quick", gravity_options.quick, "94,648 particles only");
@@ -41,14 +55,14 @@ int measure(int argc, char** argv) {
   gravity->add_option("--precision", gravity_options.precision, "of the device's sums: mixed or double")
       ->check(CLI::IsMember({"mixed", "double"}));
   gravity->add_option("--pairs", gravity_options.pairs, "evaluations per setting; the best counts");
-  gravity->add_option("--json", gravity_options.json, "file for the results, - for standard output");
+  add_json(*gravity, gravity_options.json);
   breccia::bench::WorkBenchOptions work_options;
   CLI::App* work = app.add_subcommand("work", "time against the counted work by which slabs are balanced");
   work->add_option("--seconds", work_options.seconds, "least time of a measurement")->capture_default_str();
-  work->add_option("--json", work_options.json, "file for the results, - for standard output");
+  add_json(*work, work_options.json);
   breccia::bench::MessageBenchOptions message_options;
   CLI::App* messages = app.add_subcommand("messages", "latency and bandwidth between two ranks");
-  messages->add_option("--json", message_options.json, "file for the results, - for standard output");
+  add_json(*messages, message_options.json);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& e) {

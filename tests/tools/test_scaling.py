@@ -166,6 +166,18 @@ class Batch(unittest.TestCase):
         self.assertEqual(batch.environment_for_runs({"OMP_NUM_THREADS": "4"})["OMP_NUM_THREADS"], "4")
 
 
+class Arguments(unittest.TestCase):
+    def refused(self, *arguments):
+        done = subprocess.run([sys.executable, str(ROOT / "tools/scaling"), *arguments], capture_output=True, text=True,
+                              check=False)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        return done.stderr.splitlines()[-1]
+
+    def test_folders_that_are_missing_are_told_before_the_runs(self):
+        self.assertIn("--scratch nowhere/at: no such folder", self.refused("--scratch", "nowhere/at"))
+        self.assertIn("--json nowhere/a.json: its folder does not exist", self.refused("--json", "nowhere/a.json"))
+
+
 class Series(unittest.TestCase):
     def test_strong_series_on_one_and_two_ranks(self):
         with tempfile.TemporaryDirectory() as folder:
