@@ -3,6 +3,7 @@
 #include <cstdio>
 #include <filesystem>
 #include <string>
+#include <system_error>
 
 #include "bench/engine_bench.hpp"
 #include "bench/gravity_bench.hpp"
@@ -13,16 +14,23 @@
 
 namespace {
 
-// Asked before minutes of measurements, not after them.
-std::string require_folder(const std::string& file) {
+// What keeps a file from being written, if anything: asked before minutes of measurements, not after them. Collective;
+// rank 0 writes, and others need not see its folder.
+std::string obstacle(const std::string& file) {
+  const breccia::mpi::Comm comm;
+  const auto is_folder = [](const std::filesystem::path& path) {
+    std::error_code unreadable;
+    return std::filesystem::is_directory(path, unreadable);
+  };
   const std::filesystem::path folder = std::filesystem::path(file).parent_path();
-  if (folder.empty() || std::filesystem::is_directory(folder)) return {};
-  return file + ": its folder does not exist";
+  if (comm.any(comm.is_root() && is_folder(file))) return file + ": is a folder";
+  if (comm.any(comm.is_root() && !folder.empty() && !is_folder(folder))) return file + ": its folder does not exist";
+  return {};
 }
 
 void add_json(CLI::App& command, std::string& file) {
   command.add_option("--json", file, "file for the results, - for standard output")
-      ->check(CLI::Validator(require_folder, "FILE"));
+      ->check(CLI::Validator(obstacle, "FILE"));
 }
 
 int measure(int argc, char** argv) {

@@ -15,8 +15,8 @@ bool HostEngine<P>::has_few_nodes() const {
 
 template <class P>
 bool HostEngine<P>::outgrows_cache() const {
-  // Measured at 1.4 particles a cell (docs/performance.md): to ask for nodes costs 2 % below and gives up to 50 %
-  // beyond.
+  // At 1.4 particles a cell to ask for nodes costs 2 % at 43 MB, gives 1 % at 86 MB and a third at 200
+  // (docs/performance.md): beyond what a processor's last cache has for one program beside others.
   constexpr std::size_t kCache = std::size_t{64} << 20;
   return 2 * places() * kChannels * sizeof(Real) + store_.packs() * kLanes * store_.record_bytes() > kCache;
 }

@@ -12,55 +12,63 @@ class NodesAhead {
   using Real = typename P::Real;
 
  public:
-  /// While `tile` is passed over, for those of `ahead`, or none (kNoTile).
+  /// Asks for the nodes of tile `ahead` while `tile` is passed over; for none if it is kNoTile.
   BRECCIA_HD NodesAhead(const PassArguments<P>& arguments, const Tile& tile, std::uint32_t ahead)
-      : a_(arguments), packs_(static_cast<int>((tile.particles + P::kLanes - 1) / P::kLanes)) {
-    if (ahead != kNoTile) ahead_ = a_.tiles + ahead;
+      : a_(arguments), packs_(static_cast<int>((tile.particles + P::kLanes - 1) / P::kLanes)), ahead_(ahead) {}
+
+  /// To be called with each pack in turn: what is asked for is spread over all of them, as only some ten lines can be
+  /// under way at once.
+  BRECCIA_HD void ask(int pack) {
+    for_each_line(pack, [](const Real* line) BRECCIA_INLINE_LAMBDA { __builtin_prefetch(line, 0, 2); });
   }
 
-  /// To be called with each pack in turn: the parts are spread over all of them, as only some ten lines can be under
-  /// way at once.
-  BRECCIA_HD void ask(int pack) {
-    if (ahead_ == nullptr) return;
+  /// Calls visit(some place in the line) for the lines of the cache to be asked for with this pack.
+  template <class F>
+  BRECCIA_HD void for_each_line(int pack, F&& visit) {
+    if (ahead_ == kNoTile) return;
     const int last = (pack + 1) * kParts / packs_;
-    for (; next_ < last; ++next_) ask_for(next_);
+    for (; next_ < last; ++next_) visit_part(next_, visit);
   }
 
  private:
   // Tiles come in the order of x, y, z: the one before in y has reached the lower half of the columns, the one below
   // the lowest nodes. The first tiles of a row do without.
   static constexpr int kNewColumns = kTileWidth - 2 * kTileMargin;
-  static constexpr int kNewHeight = kTileHeight - 2 * kTileMargin;
+  static constexpr int kFirstNew = 2 * kTileMargin;
   static constexpr int kArrays = kNodePairs<P> ? 3 : 2;  // sums, and velocities in one or two
   static constexpr int kParts = kTileWidth * kNewColumns * kArrays;
 
-  BRECCIA_HD void ask_for(int part) const {
+  template <class F>
+  BRECCIA_HD void visit_part(int part, F&& visit) const {
     const int column = part / kArrays;
     const int x = column / kNewColumns;
     const int y = kTileWidth - kNewColumns + column % kNewColumns;
     // Thin tiles reach few.
-    const TileBox& starts = ahead_->starts;
-    if (x < starts.low[0] || x > starts.high[0] + 2 || y < starts.low[1] || y > starts.high[1] + 2) return;
-    const std::size_t place = TileNodes<P>::place(*ahead_, x, y) + 2 * kTileMargin;
+    const TileBox& starts = a_.tiles[ahead_].starts;
+    const int height = starts.high[2] + 3 - kFirstNew;
+    if (x < starts.low[0] || x > starts.high[0] + 2 || y < starts.low[1] || y > starts.high[1] + 2 || height <= 0)
+      return;
+    const auto place = [&](const Tile* tiles)
+                           BRECCIA_INLINE_LAMBDA { return TileNodes<P>::place(tiles[ahead_], x, y) + kFirstNew; };
     if (part % kArrays == 0) {
-      if (a_.scatter) ask_lines<kChannels>(a_.sums + place * kChannels);
+      if (a_.scatter) visit_lines<kChannels>(a_.sums + place(a_.targets) * kChannels, height, visit);
     } else if (a_.gather) {
       const std::size_t array = part % kArrays == 1 ? 0 : rest_distance(a_.places);
-      ask_lines<kVelocityStride<P>>(a_.velocities + place * kVelocityStride<P> + array);
+      visit_lines<kVelocityStride<P>>(a_.velocities + place(a_.tiles) * kVelocityStride<P> + array, height, visit);
     }
   }
 
-  template <int kStride>
-  BRECCIA_HD static void ask_lines(const Real* first) {
+  template <int kStride, class F>
+  BRECCIA_HD static void visit_lines(const Real* first, int nodes, F&& visit) {
     constexpr int kLine = static_cast<int>(64 / sizeof(Real));
+    for (int n = 0; n < nodes * kStride; n += kLine) visit(first + n);
     // Columns begin at pairs of nodes, which may be half a line.
-    constexpr int kLines = kNewHeight * kStride / kLine + (2 * kStride < kLine ? 1 : 0);
-    for (int n = 0; n < kLines; ++n) __builtin_prefetch(first + n * kLine, 0, 2);
+    if (2 * kStride < kLine) visit(first + nodes * kStride - 1);
   }
 
   const PassArguments<P>& a_;
   int packs_;
-  const Tile* ahead_ = nullptr;
+  std::uint32_t ahead_;
   int next_ = 0;
 };
 

@@ -43,7 +43,7 @@ struct TileNodes {
     }
   }
 
-  /// Of node z = 0 of a column of a tile that reaches it.
+  /// Of node z = 0 of column (x, y); the tile must reach that column.
   BRECCIA_HD static std::size_t place(const Tile& tile, int x, int y) {
     constexpr int kBelow = kBlockWidth - kTileMargin;  // nodes of the block below that are no part of the tile
     const int in_x = x + kBelow;

@@ -41,14 +41,14 @@ spin = [0, "0.02 rad/s", 0]
 )";
 }
 
-/// Particles that share only their outermost nodes: of 64,000 particles a million nodes, 64 bytes each in mixed
-/// precision.
+/// Particles that share only their outermost nodes: of 128,000 particles two million nodes, 64 bytes each in mixed
+/// precision. Longest along x, across which slabs are cut.
 inline std::string many_nodes() {
   return scene_of(1e3, 0.05) + R"([[body]]
 shape = "box"
 lattice = "cubic"
 spacing = "2.5 km"
-size = ["100 km", "100 km", "100 km"]
+size = ["200 km", "100 km", "100 km"]
 spin = [0, "0.01 rad/s", "0.02 rad/s"]
 [effects]
 gravity = "off"

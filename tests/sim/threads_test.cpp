@@ -18,7 +18,7 @@ class Threads : public testing::TestWithParam<const char*> {
   [[nodiscard]] Scene load_scene(const std::string& text) const {
     return load(text, {std::string("numerics.precision=") + GetParam()});
   }
-  // 100 steps: damage, contact, several sortings and gravity windows.
+  // After 100 steps: damage, contact, several sortings and gravity windows.
   void expect_same(const std::string& text, std::uint64_t steps = 100) const {
     const Scene scene = load_scene(text);
     const mpi::Comm world;
@@ -43,12 +43,13 @@ TEST_P(Threads, GiveTheSameOnAPeriodicAxis) {
   for (const int blocks : {1, 3, 4}) expect_same(periodic_slide(blocks));
   for (const int blocks : {1, 5}) expect_same(periodic_slide(blocks, 2));
 }
-// Where nodes come from memory they are asked for ahead, of tiles that reach all around them and others that do not.
+// Where nodes come from memory they are asked for ahead (grid/nodes_ahead.hpp; what is asked for: grid_nodes_ahead).
 TEST_P(Threads, GiveTheSameWhereNodesOutgrowTheCache) {
-  simulate(load_scene(many_nodes()), [](const TimeLoop& loop) {
+  const auto begun = [](const TimeLoop& loop) {
     EXPECT_GT(loop.engine().stats().grid_bytes, 64U << 20);  // as HostEngine::outgrows_cache
     return false;
-  });
+  };
+  simulate(load_scene(many_nodes()), begun, mpi::Comm());
   expect_same(many_nodes(), 4);
 }
 

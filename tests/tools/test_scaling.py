@@ -176,6 +176,7 @@ class Arguments(unittest.TestCase):
     def test_folders_that_are_missing_are_told_before_the_runs(self):
         self.assertIn("--scratch nowhere/at: no such folder", self.refused("--scratch", "nowhere/at"))
         self.assertIn("--json nowhere/a.json: its folder does not exist", self.refused("--json", "nowhere/a.json"))
+        self.assertIn("--json .: is a folder", self.refused("--json", "."))
 
 
 class Series(unittest.TestCase):
