@@ -19,14 +19,19 @@ def option(name):
     return sys.argv[sys.argv.index(name) + 1]
 
 
+def complain(text):
+    """In one write: of several ranks each says it, and print() writes the end of the line by itself."""
+    os.write(sys.stderr.fileno(), f"breccia: error: {text}\n".encode())
+
+
 def misbehave(how):
     if how == "hangs":
         time.sleep(1000)
     if how == "fails":
-        print("breccia: error: it failed", file=sys.stderr)
+        complain("it failed")
         sys.exit(4)
     if how == "missing":
-        print('breccia: error: parallel.device_messages = "nccl": libnccl.so.2: cannot open', file=sys.stderr)
+        complain('parallel.device_messages = "nccl": libnccl.so.2: cannot open')
         sys.exit(2)
 
 
