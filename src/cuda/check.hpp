@@ -13,4 +13,11 @@ inline void check(cudaError_t status, const char* what) {
   throw NumericsError(std::string("CUDA: ") + what + ": " + cudaGetErrorString(status));
 }
 
+/// Now, and not at the first launch, for which a stream that waits for the host could be in the way.
+template <class Kernel>
+void load(Kernel* kernel) {
+  cudaFuncAttributes attributes{};
+  check(cudaFuncGetAttributes(&attributes, kernel), "kernel");
+}
+
 }  // namespace breccia::cuda

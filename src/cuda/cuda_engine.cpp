@@ -46,6 +46,8 @@ CudaEngine<P>::CudaEngine(const grid::EngineSetup& setup, const mpi::Comm& comm)
   total_.allocate(1);
   fastest_.allocate(1);
   prepare_tile_pass<Real>();
+  prepare_lone_pass<Real>();
+  prepare_node_update<Real>();
 }
 
 template <class P>
@@ -110,6 +112,7 @@ void CudaEngine<P>::gather(double step) {
   PassArguments<Real> a = pass_arguments(step, 0.0);
   a.scatter = false;
   launch_pass(a);
+  halo_.bring_in();  // no step follows before ranks meet elsewhere
 }
 
 template <class P>

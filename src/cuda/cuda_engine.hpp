@@ -57,6 +57,7 @@ class CudaEngine final : public grid::Engine, public gravity::ResidentParticles 
   bool finish_damage() override;
   [[nodiscard]] grid::PassReport passes() const override;
   [[nodiscard]] grid::EngineStats stats() const override;
+  void abandon() override { halo_.abandon(); }
 
  private:
   // Copies of a field's components on the host.

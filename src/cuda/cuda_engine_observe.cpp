@@ -62,6 +62,7 @@ double CudaEngine<P>::work_of_periods() const {
 
 template <class P>
 double CudaEngine<P>::work_beyond_period() const {
+  halo_.watch(stream_);
   if (!boundaries_.repeats_along(setup_.uniform_gravity)) return 0.0;
   const std::vector<Vec3d> position = unfolded_positions();
   const std::vector<double> mass = component("mass", 0);
@@ -112,6 +113,7 @@ ParticleOutput CudaEngine<P>::observe() const {
 
 template <class P>
 ParticleOutput CudaEngine<P>::inspect() const {
+  halo_.watch(stream_);
   return read_particles({});
 }
 
@@ -182,6 +184,7 @@ std::optional<grid::ParticleSample> CudaEngine<P>::fastest() const {
 
 template <class P>
 std::vector<double> CudaEngine<P>::volume_ratios() const {
+  halo_.watch(stream_);
   std::vector<double> ratios = component("volume_change", 0);
   for (double& j : ratios) j += 1.0;
   return ratios;
@@ -189,6 +192,7 @@ std::vector<double> CudaEngine<P>::volume_ratios() const {
 
 template <class P>
 double CudaEngine<P>::elastic_energy() const {
+  halo_.watch(stream_);
   if (!setup_.effects.shear) return 0.0;
   const auto body_material = particles_.template download_component<std::int32_t>("body_material", 0, stream_);
   const std::vector<double> mass = component("mass", 0);

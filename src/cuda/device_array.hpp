@@ -130,6 +130,8 @@ class PinnedArray {
     data_ = static_cast<T*>(memory);
     size_ = size;
   }
+  /// To whoever else uses it, for ever.
+  void leave() noexcept { data_ = nullptr; }
 
  private:
   void free() noexcept {

@@ -8,6 +8,8 @@
 #include <mpi-ext.h>
 #endif
 
+#include "cuda/check.hpp"
+
 namespace breccia::cuda {
 
 bool mpi_takes_device_memory() {
@@ -18,6 +20,14 @@ bool mpi_takes_device_memory() {
 #else
   return false;
 #endif
+}
+
+bool device_sees_messages() {
+  int device = 0;
+  check(cudaGetDevice(&device), "device");
+  int ordering = 0;
+  check(cudaDeviceGetAttribute(&ordering, cudaDevAttrGPUDirectRDMAWritesOrdering, device), "order of remote writes");
+  return ordering >= cudaGPUDirectRDMAWritesOrderingOwner;
 }
 
 }  // namespace breccia::cuda

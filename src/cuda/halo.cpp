@@ -36,7 +36,7 @@ std::vector<std::vector<grid::BlockKey>> offers(std::span<const grid::BlockKey> 
 
 template <class Real>
 Halo<Real>::Halo(DeviceMessages wanted, const mpi::Comm& comm)
-    : messages_(make_halo_messages(choose_messages(wanted, comm).way, kBlockValues * sizeof(Real), comm)) {}
+    : messages_(make_halo_messages(choose_messages(wanted, comm), kBlockValues * sizeof(Real), comm)) {}
 
 template <class Real>
 void Halo<Real>::set(std::span<const grid::BlockKey> blocks, unsigned tiles, const grid::Periodicity& periodicity,

@@ -30,11 +30,18 @@ class Halo {
   [[nodiscard]] TileList interior() const { return {interior_.data(), interior_count_}; }
   /// Once `stream` has done what it has, the boundary's scatter, sums start on their way.
   void send(const GridView<Real>& grid, cudaStream_t stream);
-  /// Ends what send() began: what `stream` does next finds the sums of other ranks. With MPI the host waits once, for
-  /// the sums of the boundary; with NCCL it does not. Collective.
+  /// Ends what send() began: what `stream` does next finds the sums of other ranks. Collective; the host does not wait,
+  /// or with MPI only where it cannot be ahead.
   void receive(cudaStream_t stream);
+  /// HaloMessages::bring_in.
+  void bring_in() { messages_->bring_in(); }
+  /// Engine::abandon.
+  void abandon() { messages_.reset(); }
   /// To be called before the host waits for `stream`. Throws IoError if messages are known to be lost.
-  void watch(cudaStream_t stream) const { messages_->watch(stream); }
+  void watch(cudaStream_t stream) const {
+    messages_->bring_in();
+    messages_->watch(stream);
+  }
   [[nodiscard]] SharedView<Real> view() const;
   /// Sent in one step.
   [[nodiscard]] std::size_t bytes() const { return shared_ * kBlockValues * sizeof(Real); }

@@ -1,10 +1,14 @@
 #include "cuda/halo_messages.hpp"
 
+#include <cstdlib>
+#include <string_view>
+
 #include "breccia/error.hpp"
 #include "cuda/device_memory.hpp"
 #include "cuda/device_mpi.hpp"
 #include "cuda/mpi_messages.hpp"
 #include "cuda/nccl_messages.hpp"
+#include "cuda/stream_signal.hpp"
 #include "mpi/together.hpp"
 
 namespace breccia::cuda {
@@ -21,16 +25,27 @@ std::string require_nccl(const mpi::Comm& comm) {
   return version;
 }
 
-MessageChoice by_mpi() {
-  if (mpi_takes_device_memory()) return {MessageWay::kDeviceMpi, "MPI, from device to device"};
-  return {MessageWay::kPinnedMpi, "MPI, by way of pinned host memory"};
+bool can_be_ahead(bool direct) {
+  const char* wanted = std::getenv("BRECCIA_MPI_AHEAD");
+  if (wanted != nullptr && std::string_view(wanted) == "0") return false;
+  return StreamSignal::works() && (!direct || device_sees_messages());
+}
+
+// All ranks or none: one that waits in every step could wait for another that is at the next collective call already.
+MessageChoice by_mpi(const mpi::Comm& comm) {
+  const bool direct = mpi_takes_device_memory();
+  MessageChoice choice{direct ? MessageWay::kDeviceMpi : MessageWay::kPinnedMpi,
+                       direct ? "MPI, from device to device" : "MPI, by way of pinned host memory"};
+  choice.ahead = !comm.any(!can_be_ahead(direct));
+  if (!choice.ahead) choice.description += ", waited for in every step";
+  return choice;
 }
 
 }  // namespace
 
 MessageChoice choose_messages(DeviceMessages wanted, const mpi::Comm& comm) {
   if (comm.size() == 1) return {MessageWay::kPinnedMpi, ""};
-  if (wanted == DeviceMessages::kMpi) return by_mpi();
+  if (wanted == DeviceMessages::kMpi) return by_mpi(comm);
   try {
     return {MessageWay::kNccl, require_nccl(comm)};
   } catch (const UsageError& error) {
@@ -38,15 +53,16 @@ MessageChoice choose_messages(DeviceMessages wanted, const mpi::Comm& comm) {
       throw UsageError(std::string("parallel.device_messages = \"nccl\": ") + error.what() +
                        "; use \"mpi\" or \"auto\"");
     }
-    MessageChoice choice = by_mpi();
+    MessageChoice choice = by_mpi(comm);
     choice.description += std::string(" (no NCCL: ") + error.what() + ")";
     return choice;
   }
 }
 
-std::unique_ptr<HaloMessages> make_halo_messages(MessageWay way, std::size_t block_bytes, const mpi::Comm& comm) {
-  if (way == MessageWay::kNccl) return std::make_unique<NcclMessages>(nccl::load(), block_bytes, comm);
-  return std::make_unique<MpiMessages>(way == MessageWay::kDeviceMpi, block_bytes, comm);
+std::unique_ptr<HaloMessages> make_halo_messages(const MessageChoice& choice, std::size_t block_bytes,
+                                                 const mpi::Comm& comm) {
+  if (choice.way == MessageWay::kNccl) return std::make_unique<NcclMessages>(nccl::load(), block_bytes, comm);
+  return std::make_unique<MpiMessages>(choice.way == MessageWay::kDeviceMpi, choice.ahead, block_bytes, comm);
 }
 
 }  // namespace breccia::cuda

@@ -26,8 +26,12 @@ class HaloMessages {
   virtual void set(std::vector<HaloPart> parts, const void* sent, void* received) = 0;
   /// `stream` has been told to fill the buffer that is sent: so filled it goes on its way. The host does not wait.
   virtual void start(cudaStream_t stream) = 0;
-  /// What the same stream does from now on finds what the other ranks sent. MPI makes the host wait for it.
+  /// What the same stream does from now on finds what the other ranks sent. With MPI the host waits, unless it is
+  /// ahead.
   virtual void finish(cudaStream_t stream) = 0;
+  /// To be called on all ranks after the last of some steps, before any other collective call and before the host waits
+  /// for the device: what is still to be exchanged is.
+  virtual void bring_in() {}
   /// Where the host is going to wait for all that `stream` has to do: ends with IoError instead of waiting for ever if
   /// a message that it waits for is lost, as far as that is told.
   virtual void watch(cudaStream_t /*stream*/) {}
@@ -38,13 +42,15 @@ enum class MessageWay { kPinnedMpi, kDeviceMpi, kNccl };
 struct MessageChoice {
   MessageWay way;
   std::string description;  ///< for the user, with the reason where there was a choice; empty on one rank
+  bool ahead = false;       ///< with MPI: the host enqueues steps whose messages have not arrived
 };
 
 /// The way that `wanted` comes to here, the same on all ranks. Collective. Throws UsageError on all ranks where kNccl
 /// cannot be: without the library on a rank, or with ranks that share a device.
 MessageChoice choose_messages(DeviceMessages wanted, const mpi::Comm& comm);
 
-/// Messages of blocks of `block_bytes` each, that way. Collective.
-std::unique_ptr<HaloMessages> make_halo_messages(MessageWay way, std::size_t block_bytes, const mpi::Comm& comm);
+/// Messages of blocks of `block_bytes` each, in the way chosen. Collective.
+std::unique_ptr<HaloMessages> make_halo_messages(const MessageChoice& choice, std::size_t block_bytes,
+                                                 const mpi::Comm& comm);
 
 }  // namespace breccia::cuda

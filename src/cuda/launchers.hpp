@@ -18,9 +18,13 @@ constexpr unsigned blocks_for(unsigned items, unsigned threads) { return (items 
 /// Allows the shared memory of the tile pass; why the current device cannot run it, or nothing.
 template <class Real>
 std::string why_no_tile_pass();
-/// The same, once for an engine. Throws UsageError with the reason.
+/// The same, once for an engine. Throws UsageError with the reason. This and the next two load their kernels.
 template <class Real>
 void prepare_tile_pass();
+template <class Real>
+void prepare_lone_pass();
+template <class Real>
+void prepare_node_update();
 /// The whole pass over the particles in tiles (tile_pass.cuh), or over some of them; no tiles: nothing.
 template <class Real>
 void launch_tile_pass(const PassArguments<Real>& a, cudaStream_t stream);

@@ -1,17 +1,22 @@
-// Sums of shared blocks by MPI, by way of pinned memory of the host unless MPI reads that of the device. The host waits
-// once a step: MPI knows nothing of streams.
+// Sums of shared blocks by MPI, by way of pinned memory of the host unless MPI reads that of the device. MPI knows
+// nothing of streams. So what comes behind the messages is enqueued at once and waits on the device for a signal, which
+// the host gives when they have arrived: it exchanges them when it comes to that, while it enqueues the next steps and
+// at last before it waits for the device itself. Where streams cannot wait for the host, the host waits in each step.
 #pragma once
+
+#include <memory>
 
 #include "cuda/device_array.hpp"
 #include "cuda/halo_messages.hpp"
 #include "cuda/stream.hpp"
+#include "cuda/stream_signal.hpp"
 
 namespace breccia::cuda {
 
 class MpiMessages final : public HaloMessages {
  public:
-  /// `direct`: from the device's memory.
-  MpiMessages(bool direct, std::size_t block_bytes, const mpi::Comm& comm);
+  /// `direct`: from the device's memory. `ahead`: what comes behind the messages is enqueued before they arrive.
+  MpiMessages(bool direct, bool ahead, std::size_t block_bytes, const mpi::Comm& comm);
   ~MpiMessages() override;
   MpiMessages(const MpiMessages&) = delete;
   MpiMessages& operator=(const MpiMessages&) = delete;
@@ -19,9 +24,17 @@ class MpiMessages final : public HaloMessages {
   void set(std::vector<HaloPart> parts, const void* sent, void* received) override;
   void start(cudaStream_t stream) override;
   void finish(cudaStream_t stream) override;
+  void bring_in() override;
 
  private:
   [[nodiscard]] std::size_t bytes() const;
+  Event& packed(std::uint32_t step);
+  [[nodiscard]] bool may_be_ahead();
+  void exchange();               // what has been packed for the next step that has not arrived
+  void arrived();                // all of it has
+  void deliver();                // the same; the host waits
+  void deliver_what_is_there();  // without waiting
+  void give_up() noexcept;       // what is under way
 
   bool direct_;
   std::size_t block_bytes_;
@@ -30,8 +43,13 @@ class MpiMessages final : public HaloMessages {
   std::vector<HaloPart> parts_;
   const void* sent_ = nullptr;
   void* received_ = nullptr;
+  bool unknown_to_mpi_ = false;  // memory of a device, of this rank or another
   PinnedArray<std::byte> sent_host_, received_host_;
-  Event ready_;
+  std::vector<std::unique_ptr<Event>> packed_;  // of the steps that may be enqueued at once, in turns
+  std::vector<MPI_Request> receives_, sends_;   // of the step whose messages are under way
+  std::uint32_t enqueued_ = 0;                  // steps so far
+  std::uint32_t arrived_ = 0;
+  std::unique_ptr<StreamSignal> signal_;  // set to arrived_; null: never ahead
 };
 
 }  // namespace breccia::cuda

@@ -88,6 +88,12 @@ __global__ void __launch_bounds__(kThreads)
 }  // namespace
 
 template <class Real>
+void prepare_node_update() {
+  load(&collect_shared<Real>);
+  load(&node_update<Real>);
+}
+
+template <class Real>
 void launch_collect_shared(const GridView<Real>& view, const unsigned* blocks, unsigned count, Real* to,
                            cudaStream_t stream) {
   if (count == 0) return;
@@ -104,6 +110,8 @@ void launch_node_update(const NodeArguments<Real>& a, cudaStream_t stream) {
   check(cudaGetLastError(), "launch of the node update");
 }
 
+template void prepare_node_update<float>();
+template void prepare_node_update<double>();
 template void launch_collect_shared<float>(const GridView<float>&, const unsigned*, unsigned, float*, cudaStream_t);
 template void launch_collect_shared<double>(const GridView<double>&, const unsigned*, unsigned, double*, cudaStream_t);
 template void launch_node_update<float>(const NodeArguments<float>&, cudaStream_t);

@@ -38,6 +38,13 @@ class Event {
   void record(cudaStream_t stream) { check(cudaEventRecord(event_, stream), "event"); }
   /// What is enqueued on `stream` from now on comes after the moment.
   void precede(cudaStream_t stream) const { check(cudaStreamWaitEvent(stream, event_, 0), "event"); }
+  /// Whether it has come; the host does not wait.
+  [[nodiscard]] bool has_come() const {
+    const cudaError_t status = cudaEventQuery(event_);
+    if (status == cudaErrorNotReady) return false;
+    check(status, "event");
+    return true;
+  }
   /// The host waits for it.
   void wait() const { check(cudaEventSynchronize(event_), "event"); }
 

@@ -248,9 +248,11 @@ std::string why_no_tile_pass() {
 template <class Real>
 void prepare_tile_pass() {
   const std::string why_not = why_no_tile_pass<Real>();
-  if (why_not.empty()) return;
-  throw UsageError("this device cannot run in this precision: " + why_not +
-                   "; use --device host, or another numerics.precision or device");
+  if (!why_not.empty()) {
+    throw UsageError("this device cannot run in this precision: " + why_not +
+                     "; use --device host, or another numerics.precision or device");
+  }
+  load(&tile_pass<Real>);
 }
 
 template <class Real>

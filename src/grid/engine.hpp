@@ -168,6 +168,9 @@ class Engine {
   /// May wait for a device: not meant for every step.
   [[nodiscard]] virtual PassReport passes() const = 0;
   [[nodiscard]] virtual EngineStats stats() const = 0;
+  /// The engine's last call, where something else works on its device: what steps so far still wait for from other
+  /// ranks is given up, or a device that waits could give nothing back.
+  virtual void abandon() {}
   /// Has tiles and messages noted in `timeline` from now on; null: no more. An engine may have nothing to note.
   virtual void record(Timeline* timeline) { static_cast<void>(timeline); }
 };

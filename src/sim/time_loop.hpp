@@ -30,6 +30,9 @@ class TimeLoop {
   /// Goes on from a state that engine().save() and state() gave, without anything being computed anew. Collective.
   TimeLoop(const Scene& scene, const ResolvedEffects& effects, const EngineState& engine, const LoopState& state,
            int threads, const mpi::Comm& comm, grid::EngineMaker make = &grid::make_host_engine);
+  ~TimeLoop() { engine_->abandon(); }
+  TimeLoop(const TimeLoop&) = delete;
+  TimeLoop& operator=(const TimeLoop&) = delete;
 
   /// Steps until `at_time_step` returns false; it is called at every t_n, when the grid holds v^{n-1/2} and v^{n+1/2}
   /// and observe() is meaningful. Collective.

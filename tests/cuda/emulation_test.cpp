@@ -83,6 +83,47 @@ TEST(Emulation, StreamsAreLate) {
   cudaStreamDestroy(second);
 }
 
+__global__ void nothing() {}  // that no other test launches
+
+template <class Call>
+std::string refusal(Call&& call) {
+  try {
+    call();
+  } catch (const cuda_emulation::EmulationError& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// As long as a stream waits for the host nothing can be done for which the whole device is waited for.
+TEST(Emulation, FindsHostAndDeviceThatWaitForEachOther) {
+  cuda_emulation::set_order(Order::kForward);
+  cudaStream_t stream = nullptr;
+  void* total = nullptr;
+  ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
+  ASSERT_EQ(cudaMalloc(&total, sizeof(int)), cudaSuccess);
+  cudaMemsetAsync(total, 0, sizeof(int), stream);
+  bool has_come = false;
+  stream->hold([&] { return has_come; }, true);
+  int result = -1;
+  cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
+  const auto launch = [&] { cuda_emulation::launch_kernel<&nothing>(&nothing, dim3(1), dim3(1), 0, stream); };
+  EXPECT_EQ(refusal([&] { cudaStreamSynchronize(stream); }), "the host waits for a stream that waits for the host");
+  EXPECT_EQ(refusal([&] { cudaFree(total); }), "the host waits for a stream that waits for the host");
+  void* memory = nullptr;
+  cudaStream_t other = nullptr;
+  EXPECT_EQ(refusal([&] { cudaMalloc(&memory, 1); }), "memory is made while a stream waits for the host");
+  EXPECT_EQ(refusal([&] { cudaMallocHost(&memory, 1); }), "pinned memory is made while a stream waits for the host");
+  EXPECT_EQ(refusal([&] { cudaStreamCreate(&other); }), "a stream is made while a stream waits for the host");
+  EXPECT_EQ(refusal(launch), "a kernel is loaded while a stream waits for the host");
+  EXPECT_EQ(result, -1);
+  has_come = true;
+  EXPECT_EQ(refusal([&] { cudaStreamSynchronize(stream); }), "");
+  EXPECT_EQ(result, 0);
+  EXPECT_EQ(cudaFree(total), cudaSuccess);
+  EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
+}
+
 TEST(Emulation, GraphRepeatsWhatTheStreamWouldDo) {
   cuda_emulation::set_order(Order::kForward);
   cudaStream_t stream = nullptr;

@@ -60,7 +60,7 @@ def breccia():
         print("simd      x86-64-v9 (AVX-1024): 32 floats\ndevices   host: some processor, 3 hardware threads")
         return
     ranks = int(os.environ.get("OMPI_COMM_WORLD_SIZE", "1"))
-    way = "alone" if ranks == 1 else option("--set").partition("=")[2]
+    way = "alone" if ranks == 1 else "waited" if "BRECCIA_MPI_AHEAD" in os.environ else option("--set").partition("=")[2]
     how = FAKE.get(way)
     misbehave(how)
     if os.environ.get("OMPI_COMM_WORLD_RANK", "0") != "0":

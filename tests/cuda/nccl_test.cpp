@@ -1,30 +1,14 @@
 // Sums of shared blocks by NCCL, here by its stand-in (nccl_stand_in.cpp): the same bits as by MPI, no wait of the host
 // in a window, and an error for all that is missing, or goes wrong on the way.
-#include <cstdlib>
 #include <optional>
 
 #include "breccia/error.hpp"
 #include "cuda/nccl_messages.hpp"
 #include "tests/cuda/engine_cases.hpp"
+#include "tests/cuda/variable.hpp"
 
 namespace breccia::cuda {
 namespace {
-
-// A variable of the environment for as long as this lives.
-class Variable {
- public:
-  Variable(const char* name, const std::string& value) : name_(name) {
-    if (const char* old = std::getenv(name)) old_ = old;
-    setenv(name, value.c_str(), 1);
-  }
-  ~Variable() { old_ ? setenv(name_, old_->c_str(), 1) : unsetenv(name_); }
-  Variable(const Variable&) = delete;
-  Variable& operator=(const Variable&) = delete;
-
- private:
-  const char* name_;
-  std::optional<std::string> old_;
-};
 
 class Nccl : public testing::Test {
  protected:

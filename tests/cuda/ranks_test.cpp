@@ -1,11 +1,11 @@
 // The CUDA engine on several ranks, each with an emulated device of its own, against the host engine on one: particles
 // that migrate with their flaws, sums of shared blocks that travel on a stream of their own, by way of the host's
 // memory or not, slabs that are cut anew.
-#include <cstdlib>
 #include <cstring>
 #include <set>
 
 #include "tests/cuda/engine_cases.hpp"
+#include "tests/cuda/variable.hpp"
 
 namespace breccia::cuda {
 namespace {
@@ -82,16 +82,19 @@ void expect_same_bits(const EngineState& a, const EngineState& b) {
 TEST_P(CudaRanks, WayAndMomentOfTheExchangeChangeNothing) {
   const Scene scene = drifting(small_impact(GetParam()));
   const EngineState staged = state_of(scene, world_);
-  setenv("BRECCIA_CUDA_AWARE_MPI", "1", 1);
+  {
+    const Variable way("BRECCIA_CUDA_AWARE_MPI", "1");
+    expect_same_bits(state_of(scene, world_), staged);
+    cuda_emulation::set_order(Order::kRandom, 5);
+    expect_same_bits(state_of(scene, world_), staged);
+  }
   expect_same_bits(state_of(scene, world_), staged);
-  cuda_emulation::set_order(Order::kRandom, 5);
-  expect_same_bits(state_of(scene, world_), staged);
-  unsetenv("BRECCIA_CUDA_AWARE_MPI");
+  const Variable driver("BRECCIA_EMULATED_DRIVER", "old");
   expect_same_bits(state_of(scene, world_), staged);
 }
 
-// Five launches, and one wait where blocks are shared.
-TEST_P(CudaRanks, StepWaitsOnceForTheExchange) {
+// Five launches, and no wait.
+TEST_P(CudaRanks, StepNeverWaits) {
   const Scene scene = small_impact(GetParam());
   const auto engine = make_cuda_engine(setup_for(scene), world_);
   fill(*engine, scene, world_);
@@ -105,7 +108,7 @@ TEST_P(CudaRanks, StepWaitsOnceForTheExchange) {
     engine->update_grid(kStep);
   }
   EXPECT_LE(cuda_emulation::launch_count() - launches, 25U);
-  EXPECT_EQ(cuda_emulation::synchronisation_count() - waits, 5U);
+  EXPECT_EQ(cuda_emulation::synchronisation_count() - waits, 0U);
 }
 
 // What is asked of each device for the particles of its rank is what they take: in sortings after which some are
@@ -206,7 +209,10 @@ TEST_P(CudaRanks, RestoredStateGoesOn) {
   state.same_ranks = false;
   const auto third = make_cuda_engine(setup_for(scene), world_);
   third->restore(state, first->flaws());
-  for (Engine* engine : {first.get(), second.get(), third.get()}) advance(*engine, 15, kStep);
+  for (Engine* engine : {first.get(), second.get(), third.get()}) {
+    advance(*engine, 15, kStep);
+    (void)engine->passes();  // or they would wait for each other, on one device
+  }
   const ParticleOutput a = first->observe(), b = second->observe();
   ASSERT_EQ(a.id, b.id);
   for (std::size_t i = 0; i < a.size(); ++i) {

@@ -49,7 +49,8 @@ class GpuCheck(unittest.TestCase):
         self.assertTrue(found["messages"]["same"])
         self.assertEqual(found["messages"]["alone"]["way"], "none")
         self.assertEqual(found["messages"]["nccl"]["way"], "NCCL 2.28.9")
-        self.assertIn("MPI", found["messages"]["mpi"]["way"])
+        self.assertEqual(found["messages"]["mpi"]["way"], "MPI, by way of pinned host memory")
+        self.assertEqual(found["messages"]["waited"]["way"], "MPI, by way of pinned host memory, waited for in every step")
         self.assertEqual({rate["precision"] for rate in found["rates"]}, {"mixed", "double"})
         for rate in found["rates"]:
             self.assertGreater(rate["device"], 0)
@@ -148,13 +149,14 @@ class FakePrograms(unittest.TestCase):
 
     def test_missing_library_is_no_fault_but_failed_messages_are(self):
         _, found = self.expect(0, "ranks", "^done$", "nccl=missing")
-        self.assertIsNone(found["messages"]["same"])
+        self.assertTrue(found["messages"]["same"])
         self.expect(1, "ranks", "^failed: mpi: breccia: error: it failed$", "nccl=missing mpi=fails")
         self.expect(1, "ranks", "^failed: nccl: breccia: error: it failed$", "nccl=fails")
 
     def test_ranks_that_differ(self):
         self.expect(1, "ranks", "results by MPI and by NCCL are not the same", "nccl=wrong")
-        self.expect(1, "ranks", "2 ranks differ from one in elastic_energy", "nccl=wrong mpi=wrong")
+        self.expect(1, "ranks", "results by MPI and by MPI, waited for are not the same", "waited=wrong")
+        self.expect(1, "ranks", "2 ranks differ from one in elastic_energy", "nccl=wrong waited=wrong mpi=wrong")
 
     def test_one_device_is_shared(self):
         process, found = self.expect(0, "ranks", "^done$", "", devices=1)

@@ -1,10 +1,12 @@
-// How often the host waits for the device in a run as the time loop makes it: not in a step of one rank, once in one of
-// several that send by MPI, and so many times where particles are sorted and a window begins.
+// How often the host waits for the device in a run as the time loop makes it: not in a step, but for once in one of
+// several ranks where MPI's messages cannot be left for later, and so many times where particles are sorted and a
+// window begins.
 #include <algorithm>
-#include <cstdlib>
 
+#include "breccia/error.hpp"
 #include "sim/time_loop.hpp"
 #include "tests/cuda/engine_cases.hpp"
+#include "tests/cuda/variable.hpp"
 
 namespace breccia::cuda {
 namespace {
@@ -62,16 +64,52 @@ TEST(Waits, OfOneRank) {
   if (world.size() == 1) expect_waits(0, 9, world);
 }
 
-// Several, of which no particle goes to another one: these, once for the exchange, for the places of all particles,
-// their blocks twice, the blocks of the grid and seven lists of what is shared.
+// Several, of which no particle goes to another one: these, for the places of all particles, their blocks twice, the
+// blocks of the grid and seven lists of what is shared; and for the messages of a window's steps, of which the host
+// finds none there before, as streams are late.
 TEST(Waits, OfSeveralRanksByEitherWayOfMpi) {
   const mpi::Comm world;
   if (world.size() == 1) return;
   for (const char* direct : {"0", "1"}) {
-    setenv("BRECCIA_CUDA_AWARE_MPI", direct, 1);
-    expect_waits(1, 21, world);
+    const Variable way("BRECCIA_CUDA_AWARE_MPI", direct);
+    expect_waits(0, 20 + kWindow, world);
   }
-  unsetenv("BRECCIA_CUDA_AWARE_MPI");
+}
+
+// Where a stream cannot wait for the host, or does not see what MPI has put into memory of the device, or is not to.
+TEST(Waits, OfSeveralRanksThatWaitForMessages) {
+  const mpi::Comm world;
+  if (world.size() == 1) return;
+  const auto expect_one = [&] { expect_waits(1, 20 + 1, world); };
+  {
+    const Variable driver("BRECCIA_EMULATED_DRIVER", "old");
+    expect_one();
+  }
+  {
+    const Variable way("BRECCIA_CUDA_AWARE_MPI", "1");
+    const Variable ordering("BRECCIA_EMULATED_WRITES_ORDERING", "0");
+    expect_one();
+  }
+  const Variable wanted("BRECCIA_MPI_AHEAD", "0");
+  expect_one();
+}
+
+// An exception between two steps unwinds the run: gravity, which works on the same device, and the engine.
+TEST(Waits, RunCanBeLeftInTheMidstOfAWindow) {
+  const mpi::Comm world;
+  const std::size_t memory = cuda_emulation::used_bytes();
+  Scene scene = small_impact(Precision::kMixed);
+  scene.gravity.interval = static_cast<int>(kWindow);
+  const auto run = [&] {
+    sim::TimeLoop loop(scene, {.material = kRock, .decisions = {}}, 1, world, &device_maker);
+    loop.run([&](const sim::TimeLoop& l) {
+      if (l.step() == kWindow / 2) throw UsageError("enough");
+      return true;
+    });
+  };
+  EXPECT_THROW(run(), UsageError);
+  EXPECT_EQ(cuda_emulation::used_bytes(), memory);
+  world.barrier();
 }
 
 }  // namespace

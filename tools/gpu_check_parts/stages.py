@@ -136,19 +136,33 @@ def is_missing(failed):
     return 'parallel.device_messages = "nccl":' in failed
 
 
-def collide(context, out, ranks, messages, steps):
+class Way(NamedTuple):
+    """How ranks exchange messages."""
+
+    what: str
+    ranks: int
+    messages: str = "mpi"
+    environment: dict = {}
+
+
+ALONE = Way("1 rank", 1)
+BY_MPI = {"mpi": Way("MPI", 2), "waited": Way("MPI, waited for", 2, environment={"BRECCIA_MPI_AHEAD": "0"})}
+BY_NCCL = {"nccl": Way("NCCL", 2, "nccl")}
+
+
+def collide(context, out, way, steps):
     """What carried messages, ms of wall time a step, last row of diagnostics; or why there is none."""
     command = [context.folder / "breccia", "run", ROOT / "scenes/impact-200-15-coarse.toml", "--device", "cuda", "--out", out,
-               "--steps", str(steps), "--set", f"parallel.device_messages={messages}"]  # fmt: skip
-    mpirun = ["bash", "-c", f'. tools/mpi-environment; exec mpirun -n {ranks} "$@"', "mpirun", *command]
-    ended = context.programs.run(mpirun, 60, context.environment)
+               "--steps", str(steps), "--set", f"parallel.device_messages={way.messages}"]  # fmt: skip
+    mpirun = ["bash", "-c", f'. tools/mpi-environment; exec mpirun -n {way.ranks} "$@"', "mpirun", *command]
+    ended = context.programs.run(mpirun, 60, context.environment | way.environment)
     if ended.failure:
         return {"failed": reason(ended)}
     with open(out / "diagnostics.csv", newline="", encoding="utf-8") as file:
         last = list(csv.DictReader(file))[-1]
-    way = re.search(r"^messages between devices: (.*)$", ended.out, re.M)
+    said = re.search(r"^messages between devices: (.*)$", ended.out, re.M)
     return {
-        "way": way[1] if way else "none",
+        "way": said[1] if said else "none",
         "ms_a_step": 1e3 * json.loads((out / "summary.json").read_text(encoding="utf-8"))["wall_seconds"] / steps,
         "row": {name: value for name, value in last.items() if not name.startswith("wall")},
     }
@@ -167,27 +181,30 @@ def unlike(row, alone):
 
 
 def collide_on_ranks(context, results):
-    """The coarse flagship on one rank, then on two: by MPI, and where each has a device by NCCL, with the same bits."""
+    """The coarse flagship on one rank, then on two: by MPI ahead of the host and waited for in every step, and where each
+    has a device by NCCL, all with the same bits."""
     shared = context.device.count < 2
     # Whole windows: the wait for the rest of one would be booked with the output, which wall_seconds leaves out.
     steps = 2 if context.emulated else 13 * 32
-    ways = {"alone": (1, "mpi"), "mpi": (2, "mpi")} | ({} if shared else {"nccl": (2, "nccl")})
+    ways = {"alone": ALONE} | BY_MPI | ({} if shared else BY_NCCL)
     results.update(steps=steps, devices=min(context.device.count, 2), same=None)
     rows = {}
     with tempfile.TemporaryDirectory() as out:
-        for name, (ranks, messages) in ways.items():
-            run = results[name] = collide(context, Path(out) / name, ranks, messages, steps)
+        for name, way in ways.items():
+            run = results[name] = collide(context, Path(out) / name, way, steps)
             rows[name] = run.pop("row", None)
-            where = "1 rank" if ranks == 1 else f"2 ranks on {'one device' if shared else '2 devices'}, {messages.upper()}"
+            where = way.what if way is ALONE else f"2 ranks on {'one device' if shared else '2 devices'}, {way.what}"
             print(f"{where}: " + (run.get("failed") or f"{run['ms_a_step']:.2f} ms a step (messages: {run['way']})"))
     failed = [f"{name}: {results[name]['failed']}" for name in ways
               if "failed" in results[name] and not (name == "nccl" and is_missing(results[name]["failed"]))]  # fmt: skip
     if rows["alone"] and rows["mpi"]:
         failed += [f"2 ranks differ from one in {name}: {rows['mpi'][name]}, not {rows['alone'][name]}"
                    for name in unlike(rows["mpi"], rows["alone"])]  # fmt: skip
-    if rows.get("nccl") and rows["mpi"]:
-        results["same"] = rows["nccl"] == rows["mpi"]
-        failed += [] if results["same"] else ["results by MPI and by NCCL are not the same"]
+    others = [name for name in ("waited", "nccl") if rows.get(name) and rows["mpi"]]
+    different = [ways[name].what for name in others if rows[name] != rows["mpi"]]
+    if others:
+        results["same"] = not different
+    failed += [f"results by MPI and by {what} are not the same" for what in different]
     if shared:
         print("  NCCL: not tried, it needs a device for each rank")
     for line in failed:

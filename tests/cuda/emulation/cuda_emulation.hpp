@@ -85,6 +85,7 @@ struct KernelTag {};
 template <auto kKernel, class... Parameters>
 void launch_kernel(void (*kernel)(Parameters...), dim3 grid, dim3 block, std::size_t shared_bytes, cudaStream_t stream,
                    std::type_identity_t<Parameters>... arguments) {
+  (void)emulatedFuncLoad(reinterpret_cast<const void*>(kernel));
   const std::string name = kernel_name(typeid(KernelTag<kKernel>).name());
   if (const Substitute* substitute = substitute_for(name, {sizeof(Parameters)...})) {
     std::vector<std::byte> parameters;

@@ -1,10 +1,13 @@
 #include "tests/cuda/emulation/runtime_api.hpp"
 
 #include <algorithm>
+#include <atomic>
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
 #include <map>
+#include <set>
+#include <string_view>
 #include <vector>
 
 #include "tests/cuda/emulation/cuda_emulation.hpp"
@@ -39,6 +42,8 @@ std::size_t property(const char* variable, std::size_t usual) {
 std::size_t device_bytes() { return property("BRECCIA_EMULATED_MEMORY", std::size_t{2} << 30); }
 // For a thread block.
 int shared_memory_bytes() { return static_cast<int>(property("BRECCIA_EMULATED_SHARED", 232448)); }
+// What arrives from other devices is seen in order (as cudaGPUDirectRDMAWritesOrdering).
+int remote_writes_ordering() { return static_cast<int>(property("BRECCIA_EMULATED_WRITES_ORDERING", 100)); }
 // 90 is 9.0.
 int capability() { return static_cast<int>(property("BRECCIA_EMULATED_CAPABILITY", 90)); }
 #if defined(__SANITIZE_ADDRESS__)
@@ -83,6 +88,7 @@ Memory& memory() {
 }
 
 std::uint64_t launches = 0;
+std::set<const void*> loaded;  // kernels
 const Substitutes* substitutes = nullptr;
 std::uint64_t synchronisations = 0;
 std::uint64_t allocation_calls = 0;
@@ -91,8 +97,22 @@ std::uint64_t copied_to_host = 0;
 int device_of_this = 0;
 std::vector<EmulatedStream*> streams;
 
+// The host waits: for ever, where the stream waits for the host.
+void finish(EmulatedStream* stream, std::uint64_t count) {
+  if (!stream->run_until(count)) throw EmulationError("the host waits for a stream that waits for the host");
+}
+
 void run_all() {
-  for (std::size_t n = 0; n < streams.size(); ++n) streams[n]->run_until(streams[n]->enqueued);
+  for (std::size_t n = 0; n < streams.size(); ++n) finish(streams[n], streams[n]->enqueued);
+}
+
+// What the runtime may wait for the whole device to do.
+void refuse_where_host_is_awaited(const std::string& what) {
+  for (const EmulatedStream* stream : streams) {
+    for (const EmulatedStream::Work& work : stream->waiting) {
+      if (work.waits_for_host && !work.may_begin()) throw EmulationError(what + " while a stream waits for the host");
+    }
+  }
 }
 
 }  // namespace
@@ -142,25 +162,40 @@ void launch(const std::string& kernel, dim3 grid, dim3 block, std::size_t shared
 
 }  // namespace breccia::cuda_emulation
 
-void EmulatedStream::enqueue(std::function<void()> work) {
+namespace {
+
+void append(EmulatedStream& stream, EmulatedStream::Work work) {
   using namespace breccia::cuda_emulation;
-  if (capturing != nullptr) {
-    capturing->work.push_back(std::move(work));
-    return;
-  }
-  waiting.push_back(std::move(work));
-  ++enqueued;
+  stream.waiting.push_back(std::move(work));
+  ++stream.enqueued;
   const std::size_t early = early_stream(streams.size());
   if (early < streams.size()) streams[early]->run_until(streams[early]->enqueued);
 }
 
-void EmulatedStream::run_until(std::uint64_t count) {
+}  // namespace
+
+void EmulatedStream::enqueue(std::function<void()> work) {
+  if (capturing != nullptr) {
+    capturing->work.push_back(std::move(work));
+  } else {
+    append(*this, {std::move(work), {}});
+  }
+}
+
+void EmulatedStream::hold(std::function<bool()> has_come, bool of_the_host) {
+  if (capturing != nullptr) throw breccia::cuda_emulation::EmulationError("a graph that waits is not emulated");
+  append(*this, {[] {}, std::move(has_come), of_the_host});
+}
+
+bool EmulatedStream::run_until(std::uint64_t count) {
   while (done < count) {
-    const std::function<void()> work = std::move(waiting.front());
+    if (waiting.front().may_begin && !waiting.front().may_begin()) return false;
+    const Work work = std::move(waiting.front());
     waiting.pop_front();
     ++done;
-    work();
+    work.run();
   }
+  return true;
 }
 
 using breccia::cuda_emulation::EmulationError;
@@ -204,8 +239,14 @@ cudaError_t cudaGetDeviceProperties(cudaDeviceProp* properties, int device) {
   *properties = {"emulated device", device_bytes(), capability() / 10, capability() % 10, 0, device, 0};
   return cudaSuccess;
 }
-cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr, int) {
-  *value = breccia::cuda_emulation::shared_memory_bytes();
+cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr attribute, int) {
+  using namespace breccia::cuda_emulation;
+  *value = attribute == cudaDevAttrGPUDirectRDMAWritesOrdering ? remote_writes_ordering() : shared_memory_bytes();
+  return cudaSuccess;
+}
+cudaError_t emulatedFuncLoad(const void* kernel) {
+  using namespace breccia::cuda_emulation;
+  if (loaded.insert(kernel).second) refuse_where_host_is_awaited("a kernel is loaded");
   return cudaSuccess;
 }
 // The kernels are there for 8.0 and what comes.
@@ -213,6 +254,23 @@ cudaError_t emulatedFuncSetAttribute(cudaFuncAttribute, int value) {
   using namespace breccia::cuda_emulation;
   if (capability() < 80) return cudaErrorNoKernelImageForDevice;
   return value <= shared_memory_bytes() ? cudaSuccess : cudaErrorInvalidValue;
+}
+namespace {
+int emulated_wait_value(cudaStream_t stream, unsigned long long address, std::uint32_t value, unsigned) {
+  auto* const number = reinterpret_cast<std::uint32_t*>(address);
+  stream->hold([=] { return static_cast<std::int32_t>(std::atomic_ref(*number).load() - value) >= 0; }, true);
+  return 0;
+}
+}  // namespace
+cudaError_t cudaGetDriverEntryPointByVersion(const char* name, void** function, unsigned, unsigned long long,
+                                             cudaDriverEntryPointQueryResult* found) {
+  const char* driver = std::getenv("BRECCIA_EMULATED_DRIVER");
+  const bool old = driver != nullptr && std::string_view(driver) == "old";
+  *found = old ? cudaDriverEntryPointSymbolNotFound : cudaDriverEntryPointSuccess;
+  *function = nullptr;
+  if (!old && std::string_view(name) == "cuStreamWaitValue32")
+    *function = reinterpret_cast<void*>(&emulated_wait_value);
+  return cudaSuccess;
 }
 cudaError_t cudaMemGetInfo(std::size_t* available, std::size_t* total) {
   *total = breccia::cuda_emulation::device_bytes();
@@ -223,6 +281,7 @@ cudaError_t cudaMemGetInfo(std::size_t* available, std::size_t* total) {
 cudaError_t cudaMalloc(void** address, std::size_t bytes) {
   using namespace breccia::cuda_emulation;
   ++allocation_calls;
+  refuse_where_host_is_awaited("memory is made");
   if (memory().used + bytes > device_bytes()) return cudaErrorMemoryAllocation;
   auto* start = static_cast<unsigned char*>(std::malloc(bytes + 2 * kGuard));
   if (start == nullptr) return cudaErrorMemoryAllocation;
@@ -258,6 +317,7 @@ cudaError_t cudaFree(void* address) {
 
 cudaError_t cudaMallocHost(void** address, std::size_t bytes) {
   ++breccia::cuda_emulation::allocation_calls;
+  breccia::cuda_emulation::refuse_where_host_is_awaited("pinned memory is made");
   *address = std::malloc(bytes);
   return *address != nullptr ? cudaSuccess : cudaErrorMemoryAllocation;
 }
@@ -296,6 +356,7 @@ cudaError_t cudaMemsetAsync(void* to, int value, std::size_t bytes, cudaStream_t
 }
 
 cudaError_t cudaStreamCreate(cudaStream_t* stream) {
+  breccia::cuda_emulation::refuse_where_host_is_awaited("a stream is made");
   *stream = new EmulatedStream;
   breccia::cuda_emulation::streams.push_back(*stream);
   return cudaSuccess;
@@ -322,7 +383,7 @@ cudaError_t cudaStreamDestroy(cudaStream_t stream) {
 cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
   ++breccia::cuda_emulation::synchronisations;
   if (stream->capturing != nullptr) return cudaErrorInvalidValue;
-  stream->run_until(stream->enqueued);
+  breccia::cuda_emulation::finish(stream, stream->enqueued);
   return cudaSuccess;
 }
 cudaError_t cudaEventCreateWithFlags(cudaEvent_t* event, unsigned) {
@@ -340,12 +401,15 @@ cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream) {
 }
 cudaError_t cudaEventSynchronize(cudaEvent_t event) {
   ++breccia::cuda_emulation::synchronisations;
-  if (event->stream != nullptr) event->stream->run_until(event->after);
+  if (event->stream != nullptr) breccia::cuda_emulation::finish(event->stream, event->after);
   return cudaSuccess;
+}
+cudaError_t cudaEventQuery(cudaEvent_t event) {
+  return event->stream == nullptr || event->stream->done >= event->after ? cudaSuccess : cudaErrorNotReady;
 }
 cudaError_t cudaStreamWaitEvent(cudaStream_t stream, cudaEvent_t event, unsigned) {
   if (event->stream == nullptr) return cudaSuccess;
-  breccia::cuda_emulation::enqueue(stream, [then = *event] { then.stream->run_until(then.after); });
+  stream->hold([then = *event] { return then.stream->run_until(then.after); }, false);
   return cudaSuccess;
 }
 cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode) {

@@ -26,8 +26,14 @@ enum cudaError_t {
 };
 enum cudaMemcpyKind { cudaMemcpyHostToDevice = 1, cudaMemcpyDeviceToHost = 2, cudaMemcpyDeviceToDevice = 3 };
 enum cudaFuncAttribute { cudaFuncAttributeMaxDynamicSharedMemorySize = 8 };
-enum cudaDeviceAttr { cudaDevAttrMaxSharedMemoryPerBlockOptin = 97 };
+enum cudaDeviceAttr {
+  cudaDevAttrMaxSharedMemoryPerBlockOptin = 97,
+  cudaDevAttrGPUDirectRDMAWritesOrdering = 118,
+};
+constexpr int cudaGPUDirectRDMAWritesOrderingOwner = 100;
 enum cudaStreamCaptureMode { cudaStreamCaptureModeThreadLocal = 1 };
+enum cudaDriverEntryPointQueryResult { cudaDriverEntryPointSuccess = 0, cudaDriverEntryPointSymbolNotFound = 1 };
+constexpr unsigned long long cudaEnableDefault = 0;
 
 /// Libraries of others than the engine, like NCCL, reach a stream by this class alone: they are loaded at run time and
 /// see no function of the program's.
@@ -35,10 +41,19 @@ struct EmulatedStream {
   virtual ~EmulatedStream() = default;
   /// Later, or as a part of the graph that the stream captures.
   virtual void enqueue(std::function<void()> work);
-  void run_until(std::uint64_t count);
+  /// What is enqueued from now on does not begin before `has_come` says so. Of the host: nothing that may wait for the
+  /// whole device is possible as long as this has not come.
+  void hold(std::function<bool()> has_come, bool of_the_host);
+  /// As far as work may begin. Returns whether so much is done.
+  bool run_until(std::uint64_t count);
 
+  struct Work {
+    std::function<void()> run;
+    std::function<bool()> may_begin;  // empty: at any time
+    bool waits_for_host = false;
+  };
   struct EmulatedGraph* capturing = nullptr;
-  std::deque<std::function<void()>> waiting;
+  std::deque<Work> waiting;
   std::uint64_t enqueued = 0;
   std::uint64_t done = 0;
 };
@@ -80,6 +95,8 @@ cudaError_t cudaEventCreateWithFlags(cudaEvent_t* event, unsigned flags);
 cudaError_t cudaEventDestroy(cudaEvent_t event);
 cudaError_t cudaEventRecord(cudaEvent_t event, cudaStream_t stream);
 cudaError_t cudaEventSynchronize(cudaEvent_t event);
+/// Not counted as a wait, and the device does not get on meanwhile.
+cudaError_t cudaEventQuery(cudaEvent_t event);
 cudaError_t cudaStreamWaitEvent(cudaStream_t stream, cudaEvent_t event, unsigned flags);
 cudaError_t cudaStreamBeginCapture(cudaStream_t stream, cudaStreamCaptureMode mode);
 cudaError_t cudaStreamEndCapture(cudaStream_t stream, cudaGraph_t* graph);
@@ -88,6 +105,19 @@ cudaError_t cudaGraphLaunch(cudaGraphExec_t executable, cudaStream_t stream);
 cudaError_t cudaGraphDestroy(cudaGraph_t graph);
 cudaError_t cudaGraphExecDestroy(cudaGraphExec_t executable);
 cudaError_t cudaDeviceGetAttribute(int* value, cudaDeviceAttr attribute, int device);
+/// The driver's cuStreamWaitValue32, unless BRECCIA_EMULATED_DRIVER is "old".
+cudaError_t cudaGetDriverEntryPointByVersion(const char* name, void** function, unsigned version,
+                                             unsigned long long flags, cudaDriverEntryPointQueryResult* found);
+struct cudaFuncAttributes {
+  int numRegs;
+};
+/// Loads the kernel, as its first launch would.
+cudaError_t emulatedFuncLoad(const void* kernel);
+template <class Kernel>
+cudaError_t cudaFuncGetAttributes(cudaFuncAttributes* attributes, Kernel* kernel) {
+  *attributes = {};
+  return emulatedFuncLoad(reinterpret_cast<const void*>(kernel));
+}
 /// Of any kernel.
 cudaError_t emulatedFuncSetAttribute(cudaFuncAttribute attribute, int value);
 template <class Kernel>
