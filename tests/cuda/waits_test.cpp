@@ -100,8 +100,10 @@ TEST(Waits, RunCanBeLeftInTheMidstOfAWindow) {
   const std::size_t memory = cuda_emulation::used_bytes();
   Scene scene = small_impact(Precision::kMixed);
   scene.gravity.interval = static_cast<int>(kWindow);
+  const sim::ResolvedEffects effects{
+      .material = kRock, .gravity = true, .gravity_method = GravityMethod::kDirect, .decisions = {}};
   const auto run = [&] {
-    sim::TimeLoop loop(scene, {.material = kRock, .decisions = {}}, 1, world, &device_maker);
+    sim::TimeLoop loop(scene, effects, 1, world, &device_maker);
     loop.run([&](const sim::TimeLoop& l) {
       if (l.step() == kWindow / 2) throw UsageError("enough");
       return true;
