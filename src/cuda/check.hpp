@@ -1,4 +1,4 @@
-// Calls of the CUDA runtime that fail become one clear error.
+// Calls of the CUDA runtime that fail become one clear error, that of the loading of a kernel included.
 #pragma once
 
 #include <string>
@@ -13,7 +13,7 @@ inline void check(cudaError_t status, const char* what) {
   throw NumericsError(std::string("CUDA: ") + what + ": " + cudaGetErrorString(status));
 }
 
-/// Now, and not at the first launch, for which a stream that waits for the host could be in the way.
+/// Loads a kernel now: its first launch would, and may wait for the whole device to do so.
 template <class Kernel>
 void load(Kernel* kernel) {
   cudaFuncAttributes attributes{};

@@ -1,6 +1,6 @@
 // The MPM engine on one CUDA device: particles and grid stay there from the first step to the last. A step is three
-// launches at most, captured in a graph; the host waits at sortings, where it looks at results, and on several ranks
-// for the halo if that goes by MPI.
+// launches, captured in a graph; on several ranks five, and an exchange of what they share. The host waits at
+// sortings and where it looks at results.
 #pragma once
 
 #include <memory>

@@ -131,7 +131,10 @@ class PinnedArray {
     size_ = size;
   }
   /// To whoever else uses it, for ever.
-  void leave() noexcept { data_ = nullptr; }
+  void leave() noexcept {
+    data_ = nullptr;
+    size_ = 0;
+  }
 
  private:
   void free() noexcept {

@@ -25,18 +25,27 @@ std::string require_nccl(const mpi::Comm& comm) {
   return version;
 }
 
-bool can_be_ahead(bool direct) {
-  const char* wanted = std::getenv("BRECCIA_MPI_AHEAD");
-  if (wanted != nullptr && std::string_view(wanted) == "0") return false;
-  return StreamSignal::works() && (!direct || device_sees_messages());
+bool is_set_to(const char* variable, std::string_view value) {
+  const char* found = std::getenv(variable);
+  return found != nullptr && found == value;
 }
 
-// All ranks or none: one that waits in every step could wait for another that is at the next collective call already.
+// Not where the host waits for every launch: it would for one behind messages that it has still to exchange.
+bool stream_can_wait() {
+  return !is_set_to("BRECCIA_MPI_AHEAD", "0") && !is_set_to("CUDA_LAUNCH_BLOCKING", "1") && StreamSignal::works();
+}
+
+// The same on all ranks, so that each waits for the others at the same steps.
+bool can_be_ahead(bool direct, const mpi::Comm& comm) {
+  if (comm.any(!stream_can_wait() || (direct && !device_sees_messages()))) return false;
+  return !direct || mpi_goes_on_beside_a_wait(comm);
+}
+
 MessageChoice by_mpi(const mpi::Comm& comm) {
-  const bool direct = mpi_takes_device_memory();
+  const bool direct = !comm.any(!mpi_takes_device_memory());
   MessageChoice choice{direct ? MessageWay::kDeviceMpi : MessageWay::kPinnedMpi,
                        direct ? "MPI, from device to device" : "MPI, by way of pinned host memory"};
-  choice.ahead = !comm.any(!can_be_ahead(direct));
+  choice.ahead = can_be_ahead(direct, comm);
   if (!choice.ahead) choice.description += ", waited for in every step";
   return choice;
 }

@@ -29,8 +29,8 @@ class HaloMessages {
   /// What the same stream does from now on finds what the other ranks sent. With MPI the host waits, unless it is
   /// ahead.
   virtual void finish(cudaStream_t stream) = 0;
-  /// To be called on all ranks after the last of some steps, before any other collective call and before the host waits
-  /// for the device: what is still to be exchanged is.
+  /// To be called after the last of some steps, before the host waits for the device: what is still to be exchanged
+  /// is. Collective.
   virtual void bring_in() {}
   /// Where the host is going to wait for all that `stream` has to do: ends with IoError instead of waiting for ever if
   /// a message that it waits for is lost, as far as that is told.

@@ -1,21 +1,27 @@
 #include "cuda/mpi_messages.hpp"
 
+#include <chrono>
+#include <exception>
 #include <utility>
 
 namespace breccia::cuda {
 namespace {
 
 constexpr int kTag = 2;
-// Steps whose messages have not arrived. A stream holds about a thousand pieces of work, and to enqueue more would make
-// the host wait for a device that waits for the host. A rank that waits for the oldest of so many messages gets it, as
-// the others can go no further without it either.
-constexpr std::uint32_t kMostAhead = 32;
-constexpr std::uint32_t kEvents = 64;  // more, and so many that numbers of steps may begin again
 
 bool all_done(std::vector<MPI_Request>& requests) {
   int all = 0;
   MPI_Testall(static_cast<int>(requests.size()), requests.data(), &all, MPI_STATUSES_IGNORE);
   return all != 0;
+}
+
+bool done_soon(std::vector<MPI_Request>& requests) {
+  constexpr std::chrono::seconds kPatience{1};
+  const auto until = std::chrono::steady_clock::now() + kPatience;
+  while (!all_done(requests)) {
+    if (std::chrono::steady_clock::now() > until) return false;
+  }
+  return true;
 }
 
 void wait_for(std::vector<MPI_Request>& requests) {
@@ -25,27 +31,29 @@ void wait_for(std::vector<MPI_Request>& requests) {
 }  // namespace
 
 MpiMessages::MpiMessages(bool direct, bool ahead, std::size_t block_bytes, const mpi::Comm& comm)
-    : direct_(direct), block_bytes_(block_bytes), comm_(comm) {
+    : direct_(direct), block_bytes_(block_bytes), comm_(comm), exceptions_(std::uncaught_exceptions()) {
   MPI_Type_contiguous(static_cast<int>(block_bytes), MPI_BYTE, &block_);
   MPI_Type_commit(&block_);
-  for (std::uint32_t n = 0; n < kEvents; ++n) packed_.push_back(std::make_unique<Event>());
   if (ahead) signal_ = std::make_unique<StreamSignal>();
 }
 
 MpiMessages::~MpiMessages() {
-  if (arrived_ != enqueued_) give_up();
+  if (std::uncaught_exceptions() > exceptions_) {
+    give_up();
+  } else {
+    bring_in();
+  }
   MPI_Type_free(&block_);
 }
 
-// Where an exception ends the run with messages under way. Memory of the device can only be given back when the device
-// is done, so it goes on without them; MPI may read what it sends for as long as it likes.
-void MpiMessages::give_up() noexcept {
+// A message that another rank has begun to send can no longer be refused, and may never end if that rank has gone: then
+// MPI keeps the memory it was given.
+void MpiMessages::give_up() {
   for (MPI_Request& request : receives_) {
     if (request != MPI_REQUEST_NULL) MPI_Cancel(&request);
   }
-  wait_for(receives_);
+  if (!done_soon(receives_)) received_host_.leave();
   if (!all_done(sends_)) sent_host_.leave();
-  if (signal_) signal_->set(enqueued_);
 }
 
 std::size_t MpiMessages::bytes() const {
@@ -54,14 +62,11 @@ std::size_t MpiMessages::bytes() const {
   return blocks * block_bytes_;
 }
 
-Event& MpiMessages::packed(std::uint32_t step) { return *packed_[step % kEvents]; }
-
 void MpiMessages::set(std::vector<HaloPart> parts, const void* sent, void* received) {
-  // A CUDA-aware MPI makes memory of a device known to others when it is first sent, which may wait for the device.
-  unknown_to_mpi_ = direct_ && comm_.any(sent != sent_ || received != received_ || parts.size() != parts_.size());
   parts_ = std::move(parts);
   sent_ = sent;
   received_ = received;
+  new_to_mpi_ = direct_;
   if (direct_) return;
   sent_host_.reserve(bytes());
   received_host_.reserve(bytes());
@@ -72,15 +77,16 @@ void MpiMessages::start(cudaStream_t stream) {
   packed(enqueued_).record(stream);
 }
 
-bool MpiMessages::may_be_ahead() { return signal_ && !std::exchange(unknown_to_mpi_, false); }
-
 void MpiMessages::finish(cudaStream_t stream) {
   ++enqueued_;
-  if (may_be_ahead()) {
+  // A CUDA-aware MPI makes memory known to other devices when it is first sent, and streams and events of its own when
+  // it first needs them, for which it may wait for the device.
+  if (signal_ && !new_to_mpi_) {
     signal_->precede(stream, enqueued_);
   } else {
     deliver();
   }
+  new_to_mpi_ = false;
   if (!direct_)
     check(cudaMemcpyAsync(received_, received_host_.data(), bytes(), cudaMemcpyHostToDevice, stream), "halo");
   deliver_what_is_there();

@@ -4,6 +4,7 @@
 // at last before it waits for the device itself. Where streams cannot wait for the host, the host waits in each step.
 #pragma once
 
+#include <array>
 #include <memory>
 
 #include "cuda/device_array.hpp"
@@ -17,6 +18,7 @@ class MpiMessages final : public HaloMessages {
  public:
   /// `direct`: from the device's memory. `ahead`: what comes behind the messages is enqueued before they arrive.
   MpiMessages(bool direct, bool ahead, std::size_t block_bytes, const mpi::Comm& comm);
+  /// Collective, but while an exception passes: then other ranks may not come, and the device goes on without messages.
   ~MpiMessages() override;
   MpiMessages(const MpiMessages&) = delete;
   MpiMessages& operator=(const MpiMessages&) = delete;
@@ -27,29 +29,36 @@ class MpiMessages final : public HaloMessages {
   void bring_in() override;
 
  private:
+  // Steps whose messages have not arrived: more than a window usually has. A step enqueues seven pieces of work on the
+  // halo's stream, which takes about a thousand; beyond these the host would wait for a device that waits for the host.
+  // Where it waits for the oldest messages instead, they come: of all ranks that do, the one at the earliest step waits
+  // for others that have sent theirs already, or do so before they go on.
+  static constexpr std::uint32_t kMostAhead = 48;
+  static constexpr std::uint32_t kEvents = 64;  // so many that numbers of steps may begin again
+
   [[nodiscard]] std::size_t bytes() const;
-  Event& packed(std::uint32_t step);
-  [[nodiscard]] bool may_be_ahead();
+  Event& packed(std::uint32_t step) { return packed_[step % kEvents]; }
   void exchange();               // what has been packed for the next step that has not arrived
   void arrived();                // all of it has
   void deliver();                // the same; the host waits
   void deliver_what_is_there();  // without waiting
-  void give_up() noexcept;       // what is under way
+  void give_up();                // what is under way
 
   bool direct_;
   std::size_t block_bytes_;
   mpi::Comm comm_;
+  int exceptions_;                          // that were passing when this was made
   MPI_Datatype block_ = MPI_DATATYPE_NULL;  // so that counts are small
   std::vector<HaloPart> parts_;
   const void* sent_ = nullptr;
   void* received_ = nullptr;
-  bool unknown_to_mpi_ = false;  // memory of a device, of this rank or another
+  bool new_to_mpi_ = false;  // memory of a device, of this rank or of another
   PinnedArray<std::byte> sent_host_, received_host_;
-  std::vector<std::unique_ptr<Event>> packed_;  // of the steps that may be enqueued at once, in turns
-  std::vector<MPI_Request> receives_, sends_;   // of the step whose messages are under way
-  std::uint32_t enqueued_ = 0;                  // steps so far
+  std::array<Event, kEvents> packed_;          // of the last steps
+  std::vector<MPI_Request> receives_, sends_;  // of the step whose messages are under way
+  std::uint32_t enqueued_ = 0;                 // steps so far
   std::uint32_t arrived_ = 0;
-  std::unique_ptr<StreamSignal> signal_;  // set to arrived_; null: never ahead
+  std::unique_ptr<StreamSignal> signal_;  // set to arrived_; null: never ahead. Last: its end ends what waits for it
 };
 
 }  // namespace breccia::cuda

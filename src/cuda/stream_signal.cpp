@@ -1,6 +1,7 @@
 #include "cuda/stream_signal.hpp"
 
 #include <atomic>
+#include <chrono>
 
 #include "breccia/error.hpp"
 #include "cuda/stream.hpp"
@@ -23,18 +24,28 @@ WaitValue find_wait_value() {
   return is_there ? reinterpret_cast<WaitValue>(function) : nullptr;
 }
 
-bool enqueue_wait(WaitValue wait, cudaStream_t stream, const std::uint32_t* number, std::uint32_t value) {
-  return wait != nullptr && wait(stream, reinterpret_cast<unsigned long long>(number), value, kAtLeast) == 0;
-}
-
 }  // namespace
 
-bool StreamSignal::works() {
-  const StreamSignal signal;
-  const Stream stream;
-  if (!enqueue_wait(signal.wait_, stream, signal.number_.data(), 0)) return false;
-  check(cudaStreamSynchronize(stream), "signal of the host");
+bool ends_soon(cudaStream_t stream) {
+  constexpr std::chrono::seconds kPatience{1};
+  const auto until = std::chrono::steady_clock::now() + kPatience;
+  while (cudaStreamQuery(stream) == cudaErrorNotReady) {
+    if (std::chrono::steady_clock::now() > until) return false;
+  }
   return true;
+}
+
+bool StreamSignal::works() {
+  const Stream held(Stream::Priority::kHigh), other;  // as of a halo and of an engine
+  DeviceArray<int> number(1);
+  number.fill_bytes(0, other);
+  check(cudaStreamSynchronize(other), "trial of streams");
+  StreamSignal signal;
+  if (!signal.try_precede(held, 1)) return false;
+  number.fill_bytes(0, other);
+  const bool others_go_on = ends_soon(other);
+  const bool waits = cudaStreamQuery(held) == cudaErrorNotReady;
+  return waits && others_go_on;
 }
 
 StreamSignal::StreamSignal() : wait_(find_wait_value()) {
@@ -42,10 +53,20 @@ StreamSignal::StreamSignal() : wait_(find_wait_value()) {
   *number_.data() = 0;
 }
 
-void StreamSignal::precede(cudaStream_t stream, std::uint32_t number) const {
-  if (!enqueue_wait(wait_, stream, number_.data(), number)) {
-    throw NumericsError("CUDA: the driver does not let a stream wait for the host");
-  }
+StreamSignal::~StreamSignal() {
+  set(last_);
+  (void)cudaDeviceSynchronize();
+}
+
+bool StreamSignal::try_precede(cudaStream_t stream, std::uint32_t number) {
+  if (wait_ == nullptr) return false;
+  if (wait_(stream, reinterpret_cast<unsigned long long>(number_.data()), number, kAtLeast) != 0) return false;
+  last_ = number;
+  return true;
+}
+
+void StreamSignal::precede(cudaStream_t stream, std::uint32_t number) {
+  if (!try_precede(stream, number)) throw NumericsError("CUDA: the driver does not let a stream wait for the host");
 }
 
 void StreamSignal::set(std::uint32_t number) {

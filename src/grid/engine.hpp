@@ -139,12 +139,16 @@ class Engine {
   /// finds much of its work done while the nodes were in the cache.
   virtual void gather_scatter(double step) = 0;
 
-  /// Positions x + time * v [m] and masses [kg] of this rank's particles, in the order held_gravity expects.
+  /// Positions x + time * v [m] and masses [kg] of this rank's particles, in the order held_gravity expects. This and
+  /// the next three: only between gather() and scatter().
   virtual void predict(double time, std::vector<Vec3d>& position, std::vector<double>& mass) const = 0;
   /// Sets the acceleration held until the next call [m/s2].
   virtual void hold_gravity(std::span<const Vec3d> acceleration) = 0;
   /// v -= time * g with the held and the uniform gravity: makes v^{-1/2} from v(0).
   virtual void kick_velocities(double time) = 0;
+
+  /// Collective.
+  [[nodiscard]] virtual SignalSpeeds signal_speeds() const = 0;
 
   /// Everything at t_n, after update_grid(): velocities are the mean of v^{n-1/2} and v^{n+1/2}.
   [[nodiscard]] virtual ParticleOutput observe() const = 0;
@@ -159,8 +163,6 @@ class Engine {
   [[nodiscard]] virtual std::vector<double> volume_ratios() const = 0;
   [[nodiscard]] virtual double elastic_energy() const = 0;
 
-  /// Collective.
-  [[nodiscard]] virtual SignalSpeeds signal_speeds() const = 0;
   /// True on all ranks once every particle has D = 1; then damage is switched off and its fields are freed. Collective,
   /// only between gather() and scatter().
   virtual bool finish_damage() = 0;

@@ -246,10 +246,9 @@ std::vector<Key> parallel() {
        {"mpi", "nccl", "auto"},
        "",
        "",
-       "what carries sums between the CUDA devices of several ranks in every step: MPI, for which the host waits; "
-       "NCCL, "
-       "which needs libnccl.so.2 and a device for each rank, and has not run on hardware here (docs/gpu.md); or (auto) "
-       "NCCL where both are there. The host engine does not look at it",
+       "what carries sums between the CUDA devices of several ranks in every step: MPI; NCCL, which needs libnccl.so.2 "
+       "and a device for each rank, and has not run on hardware here (docs/gpu.md); or (auto) NCCL where both are "
+       "there. The host engine does not look at it",
        [](Draft& d, std::size_t) { return choice(d.scene.parallel.device_messages); }},
   };
 }

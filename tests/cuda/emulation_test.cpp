@@ -102,11 +102,14 @@ TEST(Emulation, FindsHostAndDeviceThatWaitForEachOther) {
   void* total = nullptr;
   ASSERT_EQ(cudaStreamCreate(&stream), cudaSuccess);
   ASSERT_EQ(cudaMalloc(&total, sizeof(int)), cudaSuccess);
+  void* pinned = nullptr;
+  ASSERT_EQ(cudaMallocHost(&pinned, sizeof(int)), cudaSuccess);
   cudaMemsetAsync(total, 0, sizeof(int), stream);
   bool has_come = false;
   stream->hold([&] { return has_come; }, true);
   int result = -1;
-  cudaMemcpyAsync(&result, total, sizeof(int), cudaMemcpyDeviceToHost, stream);
+  const auto copy_to = [&](void* to) { cudaMemcpyAsync(to, total, sizeof(int), cudaMemcpyDeviceToHost, stream); };
+  copy_to(pinned);
   const auto launch = [&] { cuda_emulation::launch_kernel<&nothing>(&nothing, dim3(1), dim3(1), 0, stream); };
   EXPECT_EQ(refusal([&] { cudaStreamSynchronize(stream); }), "the host waits for a stream that waits for the host");
   EXPECT_EQ(refusal([&] { cudaFree(total); }), "the host waits for a stream that waits for the host");
@@ -116,10 +119,12 @@ TEST(Emulation, FindsHostAndDeviceThatWaitForEachOther) {
   EXPECT_EQ(refusal([&] { cudaMallocHost(&memory, 1); }), "pinned memory is made while a stream waits for the host");
   EXPECT_EQ(refusal([&] { cudaStreamCreate(&other); }), "a stream is made while a stream waits for the host");
   EXPECT_EQ(refusal(launch), "a kernel is loaded while a stream waits for the host");
-  EXPECT_EQ(result, -1);
+  EXPECT_EQ(refusal([&] { copy_to(&result); }), "unpinned memory is copied while a stream waits for the host");
   has_come = true;
+  EXPECT_EQ(refusal([&] { copy_to(&result); }), "");
   EXPECT_EQ(refusal([&] { cudaStreamSynchronize(stream); }), "");
   EXPECT_EQ(result, 0);
+  EXPECT_EQ(cudaFreeHost(pinned), cudaSuccess);
   EXPECT_EQ(cudaFree(total), cudaSuccess);
   EXPECT_EQ(cudaStreamDestroy(stream), cudaSuccess);
 }

@@ -197,9 +197,10 @@ def collide_on_ranks(context, results):
             print(f"{where}: " + (run.get("failed") or f"{run['ms_a_step']:.2f} ms a step (messages: {run['way']})"))
     failed = [f"{name}: {results[name]['failed']}" for name in ways
               if "failed" in results[name] and not (name == "nccl" and is_missing(results[name]["failed"]))]  # fmt: skip
-    if rows["alone"] and rows["mpi"]:
-        failed += [f"2 ranks differ from one in {name}: {rows['mpi'][name]}, not {rows['alone'][name]}"
-                   for name in unlike(rows["mpi"], rows["alone"])]  # fmt: skip
+    of_two = next((rows[name] for name in BY_MPI if rows[name]), None)
+    if rows["alone"] and of_two:
+        failed += [f"2 ranks differ from one in {name}: {of_two[name]}, not {rows['alone'][name]}"
+                   for name in unlike(of_two, rows["alone"])]  # fmt: skip
     others = [name for name in ("waited", "nccl") if rows.get(name) and rows["mpi"]]
     different = [ways[name].what for name in others if rows[name] != rows["mpi"]]
     if others:

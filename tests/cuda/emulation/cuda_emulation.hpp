@@ -38,6 +38,8 @@ void set_order(Order order, std::uint64_t seed = 1);
 std::uint64_t launch_count();
 /// Calls that made the host wait for the device.
 std::uint64_t synchronisation_count();
+/// Whether a stream waits for the host, or will.
+bool host_is_awaited();
 /// Calls that made or freed memory of a device, or pinned memory of the host: each may wait for the device.
 std::uint64_t allocation_count();
 /// Copied from device to host so far.

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstdlib>
 #include <functional>
+#include <iterator>
 #include <map>
 #include <set>
 #include <string_view>
@@ -44,6 +45,10 @@ std::size_t device_bytes() { return property("BRECCIA_EMULATED_MEMORY", std::siz
 int shared_memory_bytes() { return static_cast<int>(property("BRECCIA_EMULATED_SHARED", 232448)); }
 // What arrives from other devices is seen in order (as cudaGPUDirectRDMAWritesOrdering).
 int remote_writes_ordering() { return static_cast<int>(property("BRECCIA_EMULATED_WRITES_ORDERING", 100)); }
+bool driver_is(std::string_view kind) {
+  const char* driver = std::getenv("BRECCIA_EMULATED_DRIVER");
+  return driver != nullptr && driver == kind;
+}
 // 90 is 9.0.
 int capability() { return static_cast<int>(property("BRECCIA_EMULATED_CAPABILITY", 90)); }
 #if defined(__SANITIZE_ADDRESS__)
@@ -95,6 +100,12 @@ std::uint64_t allocation_calls = 0;
 std::uint64_t copied_to_host = 0;
 
 int device_of_this = 0;
+std::map<const unsigned char*, std::size_t> pinned;  // bytes
+bool is_pinned(const void* address) {
+  const auto* a = static_cast<const unsigned char*>(address);
+  const auto next = pinned.upper_bound(a);
+  return next != pinned.begin() && a < std::prev(next)->first + std::prev(next)->second;
+}
 std::vector<EmulatedStream*> streams;
 
 // The host waits: for ever, where the stream waits for the host.
@@ -106,13 +117,19 @@ void run_all() {
   for (std::size_t n = 0; n < streams.size(); ++n) finish(streams[n], streams[n]->enqueued);
 }
 
+}  // namespace
+
+bool host_is_awaited() {
+  const auto waits = [](const EmulatedStream::Work& work) { return work.waits_for_host && !work.may_begin(); };
+  return std::any_of(streams.begin(), streams.end(),
+                     [&](const EmulatedStream* s) { return std::any_of(s->waiting.begin(), s->waiting.end(), waits); });
+}
+
+namespace {
+
 // What the runtime may wait for the whole device to do.
 void refuse_where_host_is_awaited(const std::string& what) {
-  for (const EmulatedStream* stream : streams) {
-    for (const EmulatedStream::Work& work : stream->waiting) {
-      if (work.waits_for_host && !work.may_begin()) throw EmulationError(what + " while a stream waits for the host");
-    }
-  }
+  if (host_is_awaited()) throw EmulationError(what + " while a stream waits for the host");
 }
 
 }  // namespace
@@ -190,6 +207,7 @@ void EmulatedStream::hold(std::function<bool()> has_come, bool of_the_host) {
 bool EmulatedStream::run_until(std::uint64_t count) {
   while (done < count) {
     if (waiting.front().may_begin && !waiting.front().may_begin()) return false;
+    if (breccia::cuda_emulation::driver_is("serial") && breccia::cuda_emulation::host_is_awaited()) return false;
     const Work work = std::move(waiting.front());
     waiting.pop_front();
     ++done;
@@ -257,6 +275,7 @@ cudaError_t emulatedFuncSetAttribute(cudaFuncAttribute, int value) {
 }
 namespace {
 int emulated_wait_value(cudaStream_t stream, unsigned long long address, std::uint32_t value, unsigned) {
+  if (breccia::cuda_emulation::driver_is("hasty")) return 0;
   auto* const number = reinterpret_cast<std::uint32_t*>(address);
   stream->hold([=] { return static_cast<std::int32_t>(std::atomic_ref(*number).load() - value) >= 0; }, true);
   return 0;
@@ -264,8 +283,7 @@ int emulated_wait_value(cudaStream_t stream, unsigned long long address, std::ui
 }  // namespace
 cudaError_t cudaGetDriverEntryPointByVersion(const char* name, void** function, unsigned, unsigned long long,
                                              cudaDriverEntryPointQueryResult* found) {
-  const char* driver = std::getenv("BRECCIA_EMULATED_DRIVER");
-  const bool old = driver != nullptr && std::string_view(driver) == "old";
+  const bool old = breccia::cuda_emulation::driver_is("old");
   *found = old ? cudaDriverEntryPointSymbolNotFound : cudaDriverEntryPointSuccess;
   *function = nullptr;
   if (!old && std::string_view(name) == "cuStreamWaitValue32")
@@ -319,11 +337,13 @@ cudaError_t cudaMallocHost(void** address, std::size_t bytes) {
   ++breccia::cuda_emulation::allocation_calls;
   breccia::cuda_emulation::refuse_where_host_is_awaited("pinned memory is made");
   *address = std::malloc(bytes);
+  breccia::cuda_emulation::pinned[static_cast<unsigned char*>(*address)] = bytes;
   return *address != nullptr ? cudaSuccess : cudaErrorMemoryAllocation;
 }
 cudaError_t cudaFreeHost(void* address) {
   ++breccia::cuda_emulation::allocation_calls;
   breccia::cuda_emulation::run_all();
+  breccia::cuda_emulation::pinned.erase(static_cast<unsigned char*>(address));
   std::free(address);
   return cudaSuccess;
 }
@@ -334,6 +354,9 @@ cudaError_t cudaMemcpyAsync(void* to, const void* from, std::size_t bytes, cudaM
   const bool from_device = kind != cudaMemcpyHostToDevice;
   if (memory().holds(to, bytes) != to_device || memory().holds(from, bytes) != from_device)
     return cudaErrorInvalidValue;
+  using namespace breccia::cuda_emulation;
+  const void* host = to_device ? from : to;
+  if (kind != cudaMemcpyDeviceToDevice && !is_pinned(host)) refuse_where_host_is_awaited("unpinned memory is copied");
   if (kind == cudaMemcpyDeviceToHost) breccia::cuda_emulation::copied_to_host += bytes;
   breccia::cuda_emulation::enqueue(stream, [=] { std::memcpy(to, from, bytes); });
   return cudaSuccess;
@@ -384,6 +407,11 @@ cudaError_t cudaStreamSynchronize(cudaStream_t stream) {
   ++breccia::cuda_emulation::synchronisations;
   if (stream->capturing != nullptr) return cudaErrorInvalidValue;
   breccia::cuda_emulation::finish(stream, stream->enqueued);
+  return cudaSuccess;
+}
+cudaError_t cudaDeviceSynchronize() {
+  ++breccia::cuda_emulation::synchronisations;
+  breccia::cuda_emulation::run_all();
   return cudaSuccess;
 }
 cudaError_t cudaEventCreateWithFlags(cudaEvent_t* event, unsigned) {
