@@ -8,8 +8,6 @@
 
 namespace breccia::cuda_emulation {
 
-void enqueue(cudaStream_t stream, std::function<void()> work);
-
 namespace {
 
 // What cufftMakePlanMany() was told. FFTW plans for the arrays at hand, when the work is done: it takes their
@@ -35,7 +33,7 @@ cufftResult enqueue_transform(cufftHandle handle, cufftType type, Make make, Run
   if (found == plans().end() || found->second.type != type || found->second.stream == nullptr ||
       !found->second.has_work_area)
     return CUFFT_INVALID_PLAN;
-  enqueue(found->second.stream, [p = found->second, make, run, destroy] {
+  found->second.stream->enqueue([p = found->second, make, run, destroy] {
     const auto plan = make(p);
     run(plan);
     destroy(plan);
