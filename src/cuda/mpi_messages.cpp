@@ -38,11 +38,12 @@ MpiMessages::MpiMessages(bool direct, bool ahead, std::size_t block_bytes, const
 }
 
 MpiMessages::~MpiMessages() {
-  if (std::uncaught_exceptions() > exceptions_) {
-    give_up();
-  } else {
-    bring_in();
+  try {
+    if (std::uncaught_exceptions() == exceptions_) bring_in();
+  } catch (const NumericsError&) {
+    // The device has failed, which the next use of it tells: here nobody could be told.
   }
+  if (arrived_ != enqueued_) give_up();
   MPI_Type_free(&block_);
 }
 

@@ -41,7 +41,7 @@ void finish(EmulatedStream* stream, std::uint64_t count) {
 }  // namespace
 
 void run_all() {
-  for (std::size_t n = 0; n < streams.size(); ++n) finish(streams[n], streams[n]->enqueued);
+  for (EmulatedStream* stream : streams) finish(stream, stream->enqueued);
 }
 
 bool driver_is(std::string_view kind) {
@@ -107,11 +107,10 @@ bool EmulatedStream::run_until(std::uint64_t count) {
   return true;
 }
 
-using breccia::cuda_emulation::EmulationError;
-
 namespace {
 int emulated_wait_value(cudaStream_t stream, unsigned long long address, std::uint32_t value, unsigned) {
   if (breccia::cuda_emulation::driver_is("hasty")) return 0;
+  // NOLINTNEXTLINE(performance-no-int-to-ptr): to the driver an address is a number
   auto* const number = reinterpret_cast<std::uint32_t*>(address);
   stream->hold([=] { return static_cast<std::int32_t>(std::atomic_ref(*number).load() - value) >= 0; }, true);
   return 0;
