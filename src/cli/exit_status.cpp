@@ -6,10 +6,10 @@
 #include <cstdio>
 #include <exception>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "breccia/error.hpp"
+#include "mpi/patience.hpp"
 
 namespace breccia::cli {
 namespace {
@@ -46,18 +46,6 @@ void print_error(const Outcome& outcome, int rank) {
   fmt::print(stderr, "breccia: {}{}{}\n", kind, where, line);
 }
 
-/// True once `request` is complete; false if that takes longer than `patience`.
-bool completes_within(std::chrono::seconds patience, MPI_Request& request) {
-  const auto deadline = std::chrono::steady_clock::now() + patience;
-  int done = 0;
-  MPI_Test(&request, &done, MPI_STATUS_IGNORE);
-  while (done == 0 && std::chrono::steady_clock::now() < deadline) {
-    std::this_thread::sleep_for(std::chrono::milliseconds(1));
-    MPI_Test(&request, &done, MPI_STATUS_IGNORE);
-  }
-  return done != 0;
-}
-
 }  // namespace
 
 int exit_status(const std::function<void()>& command, const mpi::Comm& comm, std::chrono::seconds patience) {
@@ -71,7 +59,7 @@ int exit_status(const std::function<void()>& command, const mpi::Comm& comm, std
   MPI_Iallgather(&mine.code, 1, MPI_INT, codes.data(), 1, MPI_INT, ending, &request);
   if (mine.code == 0) {
     MPI_Wait(&request, MPI_STATUS_IGNORE);
-  } else if (!completes_within(patience, request)) {
+  } else if (!mpi::complete_within(patience, {&request, 1})) {
     print_error(mine, comm.rank());
     MPI_Abort(comm.handle(), mine.code);
   }

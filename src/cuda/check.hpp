@@ -1,4 +1,4 @@
-// Calls of the CUDA runtime that fail become one clear error, that of the loading of a kernel included.
+// Calls of the CUDA runtime that fail become one clear error.
 #pragma once
 
 #include <string>

@@ -16,6 +16,7 @@
 #include "cuda/device_array.hpp"
 #include "cuda/stream.hpp"
 #include "cuda/stream_signal.hpp"
+#include "mpi/patience.hpp"
 
 namespace breccia::cuda {
 namespace {
@@ -29,15 +30,7 @@ class RingMessage {
     MPI_Irecv(received.data(), bytes, MPI_BYTE, (rank + ranks - 1) % ranks, kTag, comm.handle(), &requests_[0]);
     MPI_Isend(sent.data(), bytes, MPI_BYTE, (rank + 1) % ranks, kTag, comm.handle(), &requests_[1]);
   }
-  [[nodiscard]] bool comes_soon() {
-    constexpr std::chrono::seconds kPatience{1};
-    const auto until = std::chrono::steady_clock::now() + kPatience;
-    int done = 0;
-    while (done == 0 && std::chrono::steady_clock::now() < until) {
-      MPI_Testall(2, requests_.data(), &done, MPI_STATUSES_IGNORE);
-    }
-    return done != 0;
-  }
+  [[nodiscard]] bool comes_soon() { return mpi::complete_within(std::chrono::seconds(1), requests_); }
   void wait() { MPI_Waitall(2, requests_.data(), MPI_STATUSES_IGNORE); }
 
  private:

@@ -4,6 +4,8 @@
 #include <exception>
 #include <utility>
 
+#include "mpi/patience.hpp"
+
 namespace breccia::cuda {
 namespace {
 
@@ -13,15 +15,6 @@ bool all_done(std::vector<MPI_Request>& requests) {
   int all = 0;
   MPI_Testall(static_cast<int>(requests.size()), requests.data(), &all, MPI_STATUSES_IGNORE);
   return all != 0;
-}
-
-bool done_soon(std::vector<MPI_Request>& requests) {
-  constexpr std::chrono::seconds kPatience{1};
-  const auto until = std::chrono::steady_clock::now() + kPatience;
-  while (!all_done(requests)) {
-    if (std::chrono::steady_clock::now() > until) return false;
-  }
-  return true;
 }
 
 void wait_for(std::vector<MPI_Request>& requests) {
@@ -53,7 +46,7 @@ void MpiMessages::give_up() {
   for (MPI_Request& request : receives_) {
     if (request != MPI_REQUEST_NULL) MPI_Cancel(&request);
   }
-  if (!done_soon(receives_)) received_host_.leave();
+  if (!mpi::complete_within(std::chrono::seconds(1), receives_)) received_host_.leave();
   if (!all_done(sends_)) sent_host_.leave();
 }
 

@@ -24,8 +24,6 @@ WaitValue find_wait_value() {
   return is_there ? reinterpret_cast<WaitValue>(function) : nullptr;
 }
 
-}  // namespace
-
 bool ends_soon(cudaStream_t stream) {
   constexpr std::chrono::seconds kPatience{1};
   const auto until = std::chrono::steady_clock::now() + kPatience;
@@ -34,6 +32,8 @@ bool ends_soon(cudaStream_t stream) {
   }
   return true;
 }
+
+}  // namespace
 
 bool StreamSignal::works() {
   const Stream held(Stream::Priority::kHigh), other;  // as of a halo and of an engine

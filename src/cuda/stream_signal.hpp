@@ -36,7 +36,4 @@ class StreamSignal {
   PinnedArray<std::uint32_t> number_;
 };
 
-/// True once `stream` has done all it has to; false if that takes longer than a second.
-bool ends_soon(cudaStream_t stream);
-
 }  // namespace breccia::cuda
